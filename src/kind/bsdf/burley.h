@@ -9,12 +9,15 @@
 #include "kind/build.h"
 #include "microfacet.h"
 
-/* Schlick's weight (1 - c)^5, and its slope. */
+#define IMP_WIDE 1
+#define IMP_TEXT "kind/bsdf/burley_text.h"
+#include "math/lane_text.h"
+
+/* Schlick's weight, and its slope. */
 static inline double imp__schlick(double c, double *d_c)
 {
-    const double x = imp_clamp(1 - c, 0, 1), x2 = x * x;
-    *d_c = c > 0 ? -5 * x2 * x2 : 0;
-    return x2 * x2 * x;
+    *d_c = imp__schlick_slope_1(c);
+    return imp__schlick_1(c);
 }
 
 /* At the angle on the side of the lower index, e = behind over before, and its slope by c. */
@@ -30,30 +33,7 @@ static inline double imp__schlick_beside(double c, double e, double *d_c)
     return w;
 }
 
-/* Diffuse lobe over base_color cos_i/pi: Burley's with its retro-reflection, and the
- * flat one that imitates scattering below the surface. */
-struct imp__burley {
-    double value, d_roughness, d_flatness;
-};
-static inline struct imp__burley imp__burley(double cos_o, double cos_i, double cos_d,
-                                             double roughness, double flatness)
-{
-    double slope;
-    const double Fo = imp__schlick(cos_o, &slope), Fi = imp__schlick(cos_i, &slope);
-    const double R = 2 * roughness * cos_d * cos_d, dR = 2 * cos_d * cos_d;
-    const double full =
-        (1 - 0.5 * Fo) * (1 - 0.5 * Fi) + R * (Fo + Fi + Fo * Fi * (R - 1));
-    const double d_full = Fo + Fi + Fo * Fi * (2 * R - 1);
-    const double q_o = 1 + Fo * (0.5 * R - 1), q_i = 1 + Fi * (0.5 * R - 1);
-    const double slab = 1 / (cos_o + cos_i) - 0.5;
-    const double flat = 1.25 * (q_o * q_i * slab + 0.5);
-    const double d_flat = 1.25 * slab * 0.5 * (Fo * q_i + Fi * q_o);
-    return (struct imp__burley){full + (flat - full) * flatness,
-                                dR * (d_full + (d_flat - d_full) * flatness),
-                                flat - full};
-}
-
-/* Its derivatives by the three cosines. */
+/* Derivatives of the diffuse lobe by the three cosines. */
 struct imp__burley_turns {
     double by_o, by_i, by_d;
 };
@@ -79,7 +59,7 @@ static inline struct imp__burley_turns imp__burley_turns(double cos_o, double co
         (full_R + (flat_R - full_R) * flatness) * dR};
 }
 
-/* Roughness along s and t of the GGX lobe, by `roughness` and `anisotropic`. */
+/* The GGX lobe, by `roughness` and `anisotropic`. */
 struct imp__burley_facets {
     struct imp__microfacet f;
     double d_roughness[2], d_anisotropic[2];
@@ -87,18 +67,11 @@ struct imp__burley_facets {
 static inline struct imp__burley_facets imp__burley_facets(double roughness,
                                                            double anisotropic)
 {
-    const double a = sqrt(1 - 0.9 * anisotropic), r2 = roughness * roughness;
-    const double au = r2 / a, av = r2 * a, least = 1e-3;
-    struct imp__burley_facets m = {
-        {IMP_GGX, true, imp_max(au, least), imp_max(av, least), 0}, {0, 0}, {0, 0}};
-    if (au > least) {
-        m.d_roughness[0] = 2 * roughness / a;
-        m.d_anisotropic[0] = 0.45 * r2 / (a * a * a);
-    }
-    if (av > least) {
-        m.d_roughness[1] = 2 * roughness * a;
-        m.d_anisotropic[1] = -0.45 * r2 / a;
-    }
+    double alpha[2];
+    struct imp__burley_facets m;
+    imp__burley_alpha_1(roughness, anisotropic, alpha);
+    imp__burley_alpha_d_1(roughness, anisotropic, m.d_roughness, m.d_anisotropic);
+    m.f = (struct imp__microfacet){IMP_GGX, true, alpha[0], alpha[1], 0};
     return m;
 }
 

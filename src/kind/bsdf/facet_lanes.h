@@ -63,15 +63,13 @@ static inline struct imp__microfacet imp__facets_lane(const struct imp__facets *
 static __attribute__((noinline, unused)) imp_wide
 imp__beckmann_d(const struct imp__facets *f, const imp_wide3 *m)
 {
-    const imp_wide x = m->x / f->au, y = m->y / f->av, z2 = m->z * m->z,
-                   q = (x * x + y * y) / z2;
+    const imp_wide q = IMP_WIDE_OF(imp__beckmann_q)(f->au, f->av, *m);
     imp_wide e = imp__wide(0);
     for (unsigned left = imp__wide_bits(f->here); left; left &= left - 1) {
         const int k = __builtin_ctz(left);
         e[k] = exp(-q[k]);
     }
-    return imp__wide_choose(m->z > imp__wide(0), e / (IMP_PI * f->au * f->av * z2 * z2),
-                            imp__wide(0));
+    return IMP_WIDE_OF(imp__beckmann_d_of)(f->au, f->av, m->z, e);
 }
 /* imp__microfacet_d. */
 static inline imp_wide imp__facets_d(const struct imp__facets *f, imp_wide3 m)

@@ -4,30 +4,30 @@
  * normals. */
 #include "microfacet.h"
 
+#define IMP_WIDE 1
+#define IMP_TEXT "math/vec_text.h"
+#include "math/lane_text.h"
+#define IMP_WIDE 1
+#define IMP_TEXT "kind/bsdf/microfacet_text.h"
+#include "math/lane_text.h"
+
+static inline struct imp_real3_1 three(const imp_v3 *v)
+{
+    return (struct imp_real3_1){(*v)[0], (*v)[1], (*v)[2]};
+}
+
 double imp__microfacet_d(const struct imp__microfacet *f, const imp_v3 *m,
                          double d_log[2])
 {
     const double au = f->au, av = f->av;
-    const double x = (*m)[0] / au, y = (*m)[1] / av, z = (*m)[2];
-    if (!(z > 0)) {
-        if (d_log) d_log[0] = d_log[1] = 0;
-        return 0;
+    const struct imp_real3_1 h = three(m);
+    if (f->type == IMP_GGX) {
+        if (d_log) imp__ggx_d_log_1(au, av, h, d_log);
+        return imp__ggx_d_1(au, av, h);
     }
-    const double q = x * x + y * y, z2 = z * z;
-    if (f->type == IMP_BECKMANN) {
-        /* exp(-q/z^2)/(pi au av z^4);  dq/dau = -2 x^2/au */
-        if (d_log) {
-            d_log[0] = (2 * x * x / z2 - 1) / au;
-            d_log[1] = (2 * y * y / z2 - 1) / av;
-        }
-        return exp(-q / z2) / (IMP_PI * au * av * z2 * z2);
-    }
-    const double s = q + z2;
-    if (d_log) {
-        d_log[0] = (4 * x * x / s - 1) / au;
-        d_log[1] = (4 * y * y / s - 1) / av;
-    }
-    return 1 / (IMP_PI * au * av * s * s);
+    if (d_log) imp__beckmann_d_log_1(au, av, h, d_log);
+    if (!(h.z > 0)) return 0;
+    return imp__beckmann_d_of_1(au, av, h.z, exp(-imp__beckmann_q_1(au, av, h)));
 }
 
 double imp__microfacet_d_turned(const struct imp__microfacet *f, const imp_v3 *m,
@@ -40,43 +40,20 @@ double imp__microfacet_d_turned(const struct imp__microfacet *f, const imp_v3 *m
     return (2 * q * dz / z - dq) / (z * z) - 4 * dz / z;
 }
 
-static inline double g1_of(const struct imp__microfacet *f, double t2, double *slope)
-{
-    double g, dg_dt2 = 0;
-    if (f->type == IMP_GGX) {
-        const double r = sqrt(1 + t2);
-        g = 2 / (1 + r);
-        dg_dt2 = -0.5 * g * g / (2 * r);
-    } else {
-        const double a = 1 / sqrt(t2); /* infinite at normal incidence */
-        if (a >= 1.6) {
-            g = 1;
-        } else {
-            const double n = (3.535 + 2.181 * a) * a, m = 1 + (2.276 + 2.577 * a) * a;
-            g = n / m;
-            dg_dt2 = ((3.535 + 4.362 * a) * m - n * (2.276 + 5.154 * a)) / (m * m) *
-                     (-0.5 * a / t2);
-        }
-    }
-    *slope = dg_dt2;
-    return g;
-}
 double imp__microfacet_g1_of(const struct imp__microfacet *f, double t2, double *slope)
 {
-    return g1_of(f, t2, slope);
+    return f->type == IMP_GGX ? imp__ggx_g1_of_1(t2, slope)
+                              : imp__beckmann_g1_of_1(t2, slope);
 }
 
 double imp__microfacet_g1(const struct imp__microfacet *f, const imp_v3 *v, double d[2])
 {
-    const double z2 = (*v)[2] * (*v)[2], au = f->au, av = f->av;
-    const double x2 = (*v)[0] * (*v)[0] / z2, y2 = (*v)[1] * (*v)[1] / z2;
-    double dg_dt2;
-    const double g = g1_of(f, au * au * x2 + av * av * y2, &dg_dt2);
-    if (d) {
-        d[0] = dg_dt2 * 2 * au * x2;
-        d[1] = dg_dt2 * 2 * av * y2;
-    }
-    return g;
+    double own[2];
+    if (!d)
+        return f->type == IMP_GGX ? imp__ggx_g1_1(f->au, f->av, three(v))
+                                  : imp__beckmann_g1_d_1(f->au, f->av, three(v), own);
+    return f->type == IMP_GGX ? imp__ggx_g1_d_1(f->au, f->av, three(v), d)
+                              : imp__beckmann_g1_d_1(f->au, f->av, three(v), d);
 }
 
 /* Exact Smith masking: GGX's closed form is; Beckmann's has an error function. */

@@ -81,35 +81,19 @@ bool imp__principled_half(struct imp__principled_look *l)
 }
 
 static double coat_alpha(const imp_spec *in) { return 0.1 - 0.099 * in[GLOSS][0]; }
-/* D1 of the clearcoat (GTR1 with A = alpha^2) and d ln D1/d gloss. */
 static double coat_d(double alpha, double z, double *d_log)
 {
-    const double A = alpha * alpha, q = 1 + (A - 1) * z * z, l = log(A);
-    *d_log = (1 / (A - 1) - 1 / (A * l) - z * z / q) * 2 * alpha * -0.099;
-    return (A - 1) / (IMP_PI * l * q);
+    return imp__clearcoat_d_1(alpha, log(alpha * alpha), z, d_log);
 }
 
 /* ---- Value and derivatives ------------------------------------------------------- */
-
-/* Schlick's weight, at the angle on the side of the lower index; its derivative by e. */
-static double weight(const struct imp__principled_look *l, double *d_e)
-{
-    double slope;
-    *d_e = 0;
-    if (l->e > 1) return imp__schlick(l->om, &slope);
-    const double s2 = 1 - l->om * l->om, ct2 = 1 - s2 / (l->e * l->e);
-    if (!(ct2 > 0)) return 1;
-    const double ct = sqrt(ct2), w = imp__schlick(ct, &slope);
-    *d_e = slope * s2 / (l->e * l->e * l->e * ct);
-    return w;
-}
 
 static void front_add(const struct imp__principled_look *l, const imp_spec *in,
                       imp_spec *f, imp_spec *df)
 {
     const double m = l->metallic, t = l->trans, cos_i = l->wi[2];
-    double W_e, F_c, F_e, slope, dlog_coat;
-    const double W = weight(l, &W_e),
+    double F_c, F_e, dlog_coat;
+    const double W = imp__schlick_at_1(l->e, l->om),
                  F = imp__fresnel_dielectric_d(l->om, l->e, &F_c, &F_e);
     const double r = (l->e - 1) / (l->e + 1), R0 = r * r;
     const double dR0 = 4 * r / ((l->e + 1) * (l->e + 1));
@@ -124,15 +108,15 @@ static void front_add(const struct imp__principled_look *l, const imp_spec *in,
     const struct imp__burley_lobe lobe =
         imp__burley_lobe(&l->facets, &l->m, &l->wo, &l->wi);
     const double c = 1 / (4 * l->wo[2]);
-    const struct imp__burley burley =
-        imp__burley(l->wo[2], cos_i, l->om, in[ROUGHNESS][0], in[FLATNESS][0]);
+    const struct imp_burley_1 burley =
+        imp__burley_1(l->wo[2], cos_i, l->om, in[ROUGHNESS][0], in[FLATNESS][0]);
     const double lambert = cos_i * IMP_INV_PI, brdf = (1 - m) * (1 - t);
     const struct imp__microfacet quarter = {IMP_GGX, true, 0.25, 0.25, 0};
     const double coat = 0.25 * coat_d(coat_alpha(in), l->m[2], &dlog_coat) *
                         imp__microfacet_g1(&quarter, &l->wo, NULL) *
                         imp__microfacet_g1(&quarter, &l->wi, NULL) * cos_i;
     const double coat_F = 0.04 + 0.96 * W, cc = in[CLEARCOAT][0];
-    const double gloss = imp__schlick(l->om, &slope) * cos_i;
+    const double gloss = imp__schlick_1(l->om) * cos_i;
     const imp_spec dye = one + (tint - one) * s_tint;
 
     *f += Fp * (lobe.DG * c) + base * (burley.value * lambert * brdf) +
@@ -159,6 +143,7 @@ static void front_add(const struct imp__principled_look *l, const imp_spec *in,
         df[TRANS] -= base * (burley.value * lambert * (1 - m));
         return;
     }
+    const double W_e = imp__schlick_by_index_1(l->e, l->om);
     const imp_spec d_e =
         ((one - base) * (m * W_e) +
          ((one - tint * R0) * W_e + tint * ((1 - W) * dR0)) * ((1 - m) * st) +

@@ -56,8 +56,8 @@ static void front_turns(const struct imp__principled_look *l, const imp_spec *in
     add_om(t, Fp_om * (x.DG * c), l->m);
     t->wo[2] -= Fp * (x.DG * c / cos_o);
 
-    const struct imp__burley burley =
-        imp__burley(cos_o, cos_i, l->om, in[ROUGHNESS][0], in[FLATNESS][0]);
+    const struct imp_burley_1 burley =
+        imp__burley_1(cos_o, cos_i, l->om, in[ROUGHNESS][0], in[FLATNESS][0]);
     const struct imp__burley_turns by =
         imp__burley_turns(cos_o, cos_i, l->om, in[ROUGHNESS][0], in[FLATNESS][0]);
     const imp_spec diffuse = base * (IMP_INV_PI * (1 - m));

@@ -9,6 +9,10 @@
 #include "fresnel_lanes.h"
 #include "principled.h"
 
+#define IMP_WIDE IMP_WIDE_LANES
+#define IMP_TEXT "kind/bsdf/burley_text.h"
+#include "math/lane_text.h"
+
 static inline bool imp__is_coated(const struct imp_bsdf *b)
 {
     return ((const struct imp__principled_self *)b->self)->coated;
@@ -34,15 +38,11 @@ static inline imp_wide imp__index_of(const struct imp__principled_self *p,
 static inline struct imp__facets imp__facets_of(const struct imp_wide_color *in,
                                                 imp_wide_truth here, uint64_t derivative)
 {
-    const imp_wide a = imp__wide_root(1 - 0.9 * imp__cut_of(in, ANISOTROPIC)),
-                   roughness = imp__cut_of(in, ROUGHNESS), r2 = roughness * roughness,
-                   least = imp__wide(1e-3);
-    return (struct imp__facets){IMP_GGX,
-                                true,
-                                imp__principled_wanted(derivative),
-                                imp__wide_larger(r2 / a, least),
-                                imp__wide_larger(r2 * a, least),
-                                here};
+    imp_wide alpha[2];
+    IMP_WIDE_OF(imp__burley_alpha)
+    (imp__cut_of(in, ROUGHNESS), imp__cut_of(in, ANISOTROPIC), alpha);
+    return (struct imp__facets){IMP_GGX,  true,     imp__principled_wanted(derivative),
+                                alpha[0], alpha[1], here};
 }
 
 /* ---- Clearcoat ------------------------------------------------------------------- */
@@ -55,13 +55,11 @@ static inline imp_wide imp__coats_alpha(const struct imp_wide_color *in)
 static inline imp_wide imp__coats_d(const struct imp_wide_color *in, imp_wide z,
                                     imp_wide *d_log)
 {
-    const imp_wide alpha = imp__coats_alpha(in), A = alpha * alpha,
-                   q = 1 + (A - 1) * z * z;
+    const imp_wide alpha = imp__coats_alpha(in), A = alpha * alpha;
     imp_wide l;
     for (int k = 0; k < IMP_WIDE_LANES; k++)
         l[k] = k > 0 && A[k] == A[k - 1] ? l[k - 1] : log(A[k]);
-    *d_log = (1 / (A - 1) - 1 / (A * l) - z * z / q) * 2 * alpha * -0.099;
-    return (A - 1) / (IMP_PI * l * q);
+    return IMP_WIDE_OF(imp__clearcoat_d)(alpha, l, z, d_log);
 }
 /* coat_normal, where `here`. */
 static inline void imp__coats_normals(const struct imp_wide_color *in,
@@ -80,58 +78,6 @@ static inline void imp__coats_normals(const struct imp_wide_color *in,
 
 /* ---- Lobes in front -------------------------------------------------------------- */
 
-/* imp__schlick. */
-static inline imp_wide imp__schlicks(imp_wide c)
-{
-    const imp_wide x =
-        imp__wide_larger(imp__wide_lesser(1 - c, imp__wide(1)), imp__wide(0));
-    const imp_wide x2 = x * x;
-    return x2 * x2 * x;
-}
-/* weight. */
-static inline imp_wide imp__schlicks_at(imp_wide e, imp_wide om)
-{
-    const imp_wide zero = imp__wide(0), one = imp__wide(1);
-    const imp_wide s2 = 1 - om * om, ct2 = 1 - s2 / (e * e);
-    const imp_wide_truth passes = ct2 > zero;
-    const imp_wide ct = imp__wide_root(imp__wide_choose(passes, ct2, zero));
-    return imp__wide_choose(e > one, imp__schlicks(om),
-                            imp__wide_choose(passes, imp__schlicks(ct), one));
-}
-/* Its derivative by e. */
-static inline imp_wide imp__schlicks_by_index(imp_wide e, imp_wide om)
-{
-    const imp_wide zero = imp__wide(0), one = imp__wide(1);
-    const imp_wide s2 = 1 - om * om, ct2 = 1 - s2 / (e * e);
-    const imp_wide_truth passes = (ct2 > zero) & ~(e > one);
-    const imp_wide ct = imp__wide_root(imp__wide_choose(passes, ct2, one));
-    const imp_wide x = imp__wide_larger(imp__wide_lesser(1 - ct, one), zero), x2 = x * x;
-    const imp_wide slope = imp__wide_choose(ct > zero, -5 * x2 * x2, zero);
-    return imp__wide_choose(passes, slope * s2 / (e * e * e * ct), zero);
-}
-
-/* imp__burley. */
-struct imp__burleys {
-    imp_wide value, d_roughness, d_flatness;
-};
-IMP_EITHER_WAY struct imp__burleys imp__burleys(imp_wide cos_o, imp_wide cos_i,
-                                                imp_wide cos_d, imp_wide roughness,
-                                                imp_wide flatness)
-{
-    const imp_wide Fo = imp__schlicks(cos_o), Fi = imp__schlicks(cos_i);
-    const imp_wide R = 2 * roughness * cos_d * cos_d, dR = 2 * cos_d * cos_d;
-    const imp_wide full =
-        (1 - 0.5 * Fo) * (1 - 0.5 * Fi) + R * (Fo + Fi + Fo * Fi * (R - 1));
-    const imp_wide d_full = Fo + Fi + Fo * Fi * (2 * R - 1);
-    const imp_wide q_o = 1 + Fo * (0.5 * R - 1), q_i = 1 + Fi * (0.5 * R - 1);
-    const imp_wide slab = 1 / (cos_o + cos_i) - 0.5;
-    const imp_wide flat = 1.25 * (q_o * q_i * slab + 0.5);
-    const imp_wide d_flat = 1.25 * slab * 0.5 * (Fo * q_i + Fi * q_o);
-    return (struct imp__burleys){full + (flat - full) * flatness,
-                                 dR * (d_full + (d_flat - d_full) * flatness),
-                                 flat - full};
-}
-
 /* Directions on one side of the surface, the side of wo, and the facet between them: struct
  * imp__principled_look. vm: wo.m, which om is but for rounding. */
 struct imp__principled_sides {
@@ -143,7 +89,7 @@ struct imp__front {
     imp_wide e, D, Go, DG, W, F, R0, c, m, t, st, sheen, s_tint, lum, lambert, gloss;
     imp_wide coat_D, dlog_coat, coat, coat_F, cc; /* if coated */
     struct imp__facets facets;
-    struct imp__burleys burley;
+    struct IMP_WIDE_OF(imp_burley) burley;
 };
 IMP_EITHER_WAY struct imp__front imp__front_of(const bool coated, const bool clear,
                                                const struct imp_wide_color *in,
@@ -156,7 +102,7 @@ IMP_EITHER_WAY struct imp__front imp__front_of(const bool coated, const bool cle
     x.D = imp__facets_d(&x.facets, l->m);
     x.Go = imp__facets_g1(&x.facets, l->wo);
     x.DG = x.D * x.Go * imp__facets_g1(&x.facets, l->wi);
-    x.W = imp__schlicks_at(l->e, l->om);
+    x.W = IMP_WIDE_OF(imp__schlick_at)(l->e, l->om);
     x.F = IMP_WIDE_OF(imp__dielectric_from)(l->om, l->e, &cos_t);
     const imp_wide r = (x.e - 1) / (x.e + 1);
     x.R0 = r * r;
@@ -168,9 +114,9 @@ IMP_EITHER_WAY struct imp__front imp__front_of(const bool coated, const bool cle
     x.s_tint = imp__cut_of(in, SHEEN_TINT);
     x.lum = in[LUM].c[0];
     x.lambert = l->wi.z * IMP_INV_PI;
-    x.gloss = imp__schlicks(l->om) * l->wi.z;
-    x.burley = imp__burleys(l->wo.z, l->wi.z, l->om, imp__cut_of(in, ROUGHNESS),
-                            imp__cut_of(in, FLATNESS));
+    x.gloss = IMP_WIDE_OF(imp__schlick)(l->om) * l->wi.z;
+    x.burley = IMP_WIDE_OF(imp__burley)(
+        l->wo.z, l->wi.z, l->om, imp__cut_of(in, ROUGHNESS), imp__cut_of(in, FLATNESS));
     if (!coated) return x;
     const imp_wide quarter = imp__wide(0.25);
     x.coat_D = imp__coats_d(in, l->m.z, &x.dlog_coat);
@@ -212,21 +158,16 @@ static inline void imp__facets_turn(const struct imp_wide_color *in,
                                     const struct imp__front *x,
                                     const struct imp__principled_sides *l, imp_wide d[2])
 {
-    const imp_wide zero = imp__wide(0), least = imp__wide(1e-3),
-                   roughness = imp__cut_of(in, ROUGHNESS), r2 = roughness * roughness,
-                   a = imp__wide_root(1 - 0.9 * imp__cut_of(in, ANISOTROPIC));
-    const imp_wide_truth own[2] = {r2 / a > least, r2 * a > least};
-    const imp_wide by[2][2] = {{2 * roughness / a, 2 * roughness * a},
-                               {0.45 * r2 / (a * a * a), -0.45 * r2 / a}};
-    imp_wide dlog_D[2], dGo[2], dGi[2];
+    imp_wide by[2][2], dlog_D[2], dGo[2], dGi[2];
+    IMP_WIDE_OF(imp__burley_alpha_d)
+    (imp__cut_of(in, ROUGHNESS), imp__cut_of(in, ANISOTROPIC), by[0], by[1]);
     const imp_wide Go = imp__facets_g1_d(&x->facets, l->wo, dGo),
                    Gi = imp__facets_g1_d(&x->facets, l->wi, dGi);
     imp__facets_d_log(&x->facets, l->m, dlog_D);
-    d[0] = d[1] = zero;
+    d[0] = d[1] = imp__wide(0);
     for (int k = 0; k < 2; k++) {
         const imp_wide turn = x->D * (dlog_D[k] * Go * Gi + dGo[k] * Gi + Go * dGi[k]);
-        for (int j = 0; j < 2; j++)
-            d[j] += turn * imp__wide_choose(own[k], by[j][k], zero);
+        for (int j = 0; j < 2; j++) d[j] += turn * by[j][k];
     }
 }
 

@@ -103,8 +103,8 @@ IMP_EITHER_WAY bool eval_d_as(const bool coated, const struct imp_bsdf *b,
     imp_wide d_DG[2], F_c, F_e;
     imp__facets_turn(in, &x, &l, d_DG);
     IMP_WIDE_OF(imp__dielectric_d)(l.om, x.e, &F_c, &F_e);
-    const imp_wide W = x.W, W_e = imp__schlicks_by_index(x.e, l.om), m = x.m, st = x.st,
-                   R0 = x.R0, r = (x.e - 1) / (x.e + 1),
+    const imp_wide W = x.W, W_e = IMP_WIDE_OF(imp__schlick_by_index)(x.e, l.om), m = x.m,
+                   st = x.st, R0 = x.R0, r = (x.e - 1) / (x.e + 1),
                    dR0 = 4 * r / ((x.e + 1) * (x.e + 1)), de = index_slope(p, in);
     imp_wide_truth counts[N_INPUTS];
     for (int j = 0; j < N_INPUTS; j++) counts[j] = imp__counts(in, j, there);

@@ -137,8 +137,8 @@ static void reflect_add(const struct sheet *s, const imp_spec *x, imp_spec *f,
     const struct imp__burley_lobe lobe =
         imp__burley_lobe(&s->facets, &s->h, &s->wo, &s->wi);
     const double c = 1 / (4 * s->wo[2]), rest = (1 - t) * (1 - dt);
-    const struct imp__burley burley =
-        imp__burley(s->wo[2], s->wi[2], s->c, x[ROUGHNESS][0], x[FLATNESS][0]);
+    const struct imp_burley_1 burley =
+        imp__burley_1(s->wo[2], s->wi[2], s->c, x[ROUGHNESS][0], x[FLATNESS][0]);
     const double lambert = s->wi[2] * IMP_INV_PI;
     const imp_spec dye = one + (tint - one) * s_tint;
     const imp_spec matt = base * (burley.value * lambert) + dye * (sheen * gloss);
@@ -260,7 +260,7 @@ static void reflect_turn(const struct sheet *s, const imp_spec *x,
 
     const double rest = (1 - x[TRANS][0]) * (1 - 0.5 * x[DIFF_TRANS][0]);
     const double rough = x[ROUGHNESS][0], flat = x[FLATNESS][0];
-    const struct imp__burley lobe = imp__burley(s->wo[2], cos_i, s->c, rough, flat);
+    const struct imp_burley_1 lobe = imp__burley_1(s->wo[2], cos_i, s->c, rough, flat);
     const struct imp__burley_turns by =
         imp__burley_turns(s->wo[2], cos_i, s->c, rough, flat);
     const imp_spec matt = base * (rest * IMP_INV_PI),
