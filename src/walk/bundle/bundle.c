@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A bundle of walks from its pixels to its radiance: rays of the sensor; segment after segment
- * hits, vertices and shadow rays; the fold. Recorded walks have vertices of their own (walk.h) in
+ * hits, vertices and shadow rays; the fold. Recorded walks have vertices of their own (walk_parts.h) in
  * place of columns of values, or columns of what a sweep takes (swept.h). */
 #include "by_shape.h"
 #include "in_media.h"

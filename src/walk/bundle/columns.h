@@ -33,7 +33,7 @@ struct imp_flights {
     int32_t *up;   /* place of the last vertex among the values of its depth */
 };
 
-/* Values of the vertices of a depth (walk.h: E, B, w), and what comes from beyond. */
+/* Values of the vertices of a depth (walk_parts.h: E, B, w), and what comes from beyond. */
 struct imp_bundle_values {
     int n;
     double *e[4], *b[4], *w[4], *beyond[4];

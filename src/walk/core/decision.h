@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What rays and random numbers settle at a vertex of a walk (walk.h).
+ * What rays and random numbers settle at a vertex of a walk (walk_parts.h).
  *
  * Decisions are rounded to what a kept record stores before they are first evaluated:
  * evaluating a kept record gives the walk's value and gradient to the bit. Rays go on

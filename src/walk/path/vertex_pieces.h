@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The visitor of a vertex: every piece of gradient that falls off there (walk.h). A value whose
+ * The visitor of a vertex: every piece of gradient that falls off there (walk_parts.h). A value whose
  * derivative another estimator gives adds that piece here, once for all modes. */
 #ifndef IMP_WALK_VERTEX_PIECES_H
 #define IMP_WALK_VERTEX_PIECES_H
