@@ -108,15 +108,15 @@ static void paths_draw(struct imp_depth *d, const int32_t *list, int n)
     const uint64_t where = (uint64_t)d->depth << 32 | (uint32_t)IMP_FLIGHT_ALONG;
     for (int i = 0; i < n; i += IMP_WIDE_LANES) {
         struct few w;
-        struct imp_wide_block block = {.hash = {0}};
+        imp_wide_word key = {0}, turned = {0};
         imp_wide sigma[3];
         few_take(d, list, n, i, &w);
-        for (int k = 0; k < IMP_WIDE_LANES; k++)
-            block.hash[k] = d->bundle->keys[w.walk[k]];
-        block.hash = imp__wide_mix64(block.hash ^ (where + 0xa0761d6478bd642fu));
-        for (int k = 0; k < IMP_WIDE_LANES; k++)
-            block.hash[k] += (uint64_t)x->number[w.ray[k]] * 0x9e3779b97f4a7c15u;
-        block.low = block.high = (imp_wide_word){0};
+        for (int k = 0; k < IMP_WIDE_LANES; k++) {
+            key[k] = d->bundle->keys[w.walk[k]];
+            turned[k] = (uint64_t)x->number[w.ray[k]] * 0x9e3779b97f4a7c15u;
+        }
+        const struct imp_wide_block block = {
+            .hash = imp__wide_mix64(key ^ (where + 0xa0761d6478bd642fu)) + turned};
         for (int c = 0; c < 3; c++) sigma[c] = imp__media_sigma(x, c, w.medium);
         const imp_wide mine = of_drew(d, &w, sigma),
                        path = -IMP_WIDE_OF(imp__log)(1 - imp__wide_number(&block, 0)),
