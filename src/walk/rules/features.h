@@ -2,7 +2,7 @@
  *
  * What goes with what. A job is what a call asks for: a scene, one of its sensors, how walks are
  * made, and what becomes of them. A feature is something that a job has or has not, found in
- * it by a predicate (features.c) or stated by the call. A rule (rules.def): a
+ * it by a predicate (found.h) or stated by the call. A rule (rules.def): a
  * feature excludes or needs another one, and why; imp__job_allowed decides and
  * refuses. What is no pair of features (a missing end, no walks at all) is refused where it
  * is found.
@@ -15,7 +15,7 @@
 
 struct imp_active;
 
-/* X(NAME, what users call it): found in a job by a predicate (features.c). */
+/* X(NAME, what users call it): found in a job by a predicate (found.h). */
 #define IMP_FOUND_FEATURES(X)                                                            \
     X(LIGHT_TRACING, "light walks")                                                      \
     X(BIDIRECTIONAL, "bidirectional walks (bdpt)")                                       \
