@@ -12,14 +12,12 @@
  *
  * Directions are drawn from the disc, evenly, and from cells of the upper hemisphere by the
  * luminance of the sky there, with a share of each by its power. */
-#include "color/cie.h"
+#include "sunsky.h"
 #include "color/rgb.h"
 #include "emission.h"
 #include "math/transform.h"
 #include "math/trig.h"
-#include "math/weight_table.h"
 #include "sky_sun.h"
-#include "skylight.h"
 #include "sun_position.h"
 
 enum { TURBIDITY, ALBEDO, SKY_SCALE, SUN_SCALE, WAVELENGTH, N_INPUTS };
@@ -53,115 +51,6 @@ enum { TURNS = 64, HEIGHTS = 32 }; /* cells, of equal solid angle */
 #define CELL_LEAST  0.02           /* of the mean: what a cell's middle does not see */
 #define SHARE_LEAST 0.05           /* of the sky, and of the sun */
 
-struct sunsky {
-    struct imp__skylight light;
-    imp_v3 axis[3], sun; /* of the sky, unit, world; the sun in their frame */
-    double cos_radius, sun_solid, dim; /* dim: of the disc against the sun's */
-    bool by_wave, mono, limb, dark;    /* dark: the sun is below the horizon */
-    struct imp__weight_table table;
-    double *sun_share; /* of directions that are drawn from the disc */
-};
-
-/* ---- Radiance -------------------------------------------------------------------- */
-
-/* One channel's, with derivatives. */
-struct both {
-    struct imp__sky_value sky, sun;
-};
-
-struct at { /* a direction, in the frame of the sky, and a turbidity */
-    double cos_theta, cos_gamma;
-    bool in_disc;
-    struct imp__sky_place place;
-    struct imp__sky_between between;
-};
-static bool in_disc(const struct sunsky *s, double cos_gamma)
-{
-    return cos_gamma >= s->cos_radius;
-}
-static struct at at_direction(const struct sunsky *s, imp_v3 w, double turbidity)
-{
-    const double c = imp__dot(w, s->sun);
-    return (struct at){w[2], c, in_disc(s, c), imp__sky_place(w[2], c),
-                       imp__sky_between(turbidity)};
-}
-
-/* The sun's eleven wavelengths. */
-static void sun_waves(const struct sunsky *s, const struct at *x, double turbidity,
-                      struct imp__sky_value out[IMP_SKY_WAVES])
-{
-    if (!s->limb) {
-        imp__sun_mean(&s->light, turbidity, out);
-        return;
-    }
-    const double away = (1 - x->cos_gamma) / (1 - s->cos_radius);
-    imp__sun_radiance(turbidity, asin(x->cos_theta), sqrt(imp_max(1 - away, 0.0)), out);
-}
-
-static void add(struct imp__sky_value *sum, double factor, const struct imp__sky_value *v)
-{
-    sum->value += factor * v->value;
-    sum->by_turbidity += factor * v->by_turbidity;
-    sum->by_albedo += factor * v->by_albedo;
-}
-
-/* At one wavelength: lines between the model's. */
-static void at_wave(const struct sunsky *s, const struct at *x, double albedo, double nm,
-                    const struct imp__sky_value *sun, struct both *out)
-{
-    const double at = (nm - IMP_SKY_FIRST_NM) / IMP_SKY_STEP_NM;
-    *out = (struct both){0};
-    if (!(at >= 0 && at <= IMP_SKY_WAVES - 1)) return;
-    const int k = (int)imp_min(at, IMP_SKY_WAVES - 2.0);
-    for (int j = 0; j < 2; j++) {
-        const double share = j ? at - k : 1 - (at - k);
-        const struct imp__sky_value sky =
-            imp__sky_radiance(&s->light, k + j, &x->between, albedo, &x->place);
-        add(&out->sky, share, &sky);
-        if (x->in_disc) add(&out->sun, share, &sun[k + j]);
-    }
-}
-
-/* Sky and sun in colour c: the sky's tables are for colours, in units of luminance. */
-static void at_color(const struct sunsky *s, const struct at *x, double albedo, int c,
-                     const struct imp__sky_value *sun, struct both *out)
-{
-    const struct imp__sky_value sky =
-        imp__sky_radiance(&s->light, c, &x->between, albedo, &x->place);
-    *out = (struct both){0};
-    add(&out->sky, 1 / IMP_CIE_Y_INTEGRAL, &sky);
-    for (int k = 0; k < IMP_SKY_WAVES && x->in_disc; k++)
-        add(&out->sun, s->light.color[c][k], &sun[k]);
-}
-
-/* All lanes, the sun as dim as its disc is large. */
-static void lanes(const struct sunsky *s, const imp_spec *in, imp_v3 w,
-                  struct both out[4])
-{
-    const double turbidity = in[TURBIDITY][0];
-    struct imp__sky_value sun[IMP_SKY_WAVES];
-    for (int c = 0; c < 4; c++) out[c] = (struct both){0};
-    if (s->dark || !(w[2] >= 0)) return;
-    const struct at x = at_direction(s, w, turbidity);
-    if (x.in_disc) sun_waves(s, &x, turbidity, sun);
-    for (int c = 0; c < (s->by_wave ? 4 : 3); c++) {
-        const double albedo = in[ALBEDO][s->mono ? 0 : c];
-        if (s->by_wave) at_wave(s, &x, albedo, in[WAVELENGTH][c], sun, &out[c]);
-        else at_color(s, &x, albedo, c, sun, &out[c]);
-        const struct imp__sky_value full = out[c].sun;
-        out[c].sun = (struct imp__sky_value){0};
-        add(&out[c].sun, s->dim, &full);
-    }
-    if (!s->mono) return;
-    static const double weight[3] = {IMP_LUM_R, IMP_LUM_G, IMP_LUM_B};
-    struct both sum = {0};
-    for (int c = 0; c < 3; c++) {
-        add(&sum.sky, weight[c], &out[c].sky);
-        add(&sum.sun, weight[c], &out[c].sun);
-    }
-    for (int c = 0; c < 4; c++) out[c] = sum;
-}
-
 static imp_v3 local(const struct sunsky *s, imp_v3 w)
 {
     return imp__v3(imp__dot(w, s->axis[0]), imp__dot(w, s->axis[1]),
@@ -172,8 +61,9 @@ static void eval(const struct imp_emitter *e, const imp_spec *in,
                  const struct imp_emission *x, imp_spec *le)
 {
     const struct sunsky *s = e->self;
-    struct both b[4];
-    lanes(s, in, local(s, -x->d), b);
+    struct sunsky_both b[4];
+    imp__sunsky_lanes(s, in[TURBIDITY][0], &in[ALBEDO], &in[WAVELENGTH], local(s, -x->d),
+                      b);
     for (int c = 0; c < 4; c++)
         (*le)[c] = in[SKY_SCALE][0] * b[c].sky.value + in[SUN_SCALE][0] * b[c].sun.value;
 }
@@ -182,8 +72,9 @@ static void eval_d(const struct imp_emitter *e, const imp_spec *in,
 {
     const struct sunsky *s = e->self;
     const double sky = in[SKY_SCALE][0], sun = in[SUN_SCALE][0];
-    struct both b[4];
-    lanes(s, in, local(s, -x->d), b);
+    struct sunsky_both b[4];
+    imp__sunsky_lanes(s, in[TURBIDITY][0], &in[ALBEDO], &in[WAVELENGTH], local(s, -x->d),
+                      b);
     for (int c = 0; c < 4; c++) {
         dle[TURBIDITY][c] = sky * b[c].sky.by_turbidity + sun * b[c].sun.by_turbidity;
         dle[ALBEDO][c] = sky * b[c].sky.by_albedo;
@@ -206,11 +97,11 @@ static void luminances(const struct imp_emitter *e, imp_v3 w, double *sky, doubl
         [ALBEDO] = imp__spec(one ? a[0] : imp__luminance(a[0], a[1], a[2]))};
     double y_sky = 0, y_sun = 0;
     for (int first = 0; first < (s->by_wave ? IMP_SKY_WAVES : 1); first += 4) {
-        struct both b[4];
+        struct sunsky_both b[4];
         for (int c = 0; c < 4; c++)
             in[WAVELENGTH][c] = IMP_SKY_FIRST_NM +
                                 IMP_SKY_STEP_NM * imp_min(first + c, IMP_SKY_WAVES - 1);
-        lanes(s, in, w, b);
+        imp__sunsky_lanes(s, in[TURBIDITY][0], &in[ALBEDO], &in[WAVELENGTH], w, b);
         for (int c = 0; c < (s->by_wave ? 4 : 3) && first + c < IMP_SKY_WAVES; c++) {
             const int k = first + c;
             const double y =
@@ -266,7 +157,8 @@ static double density(const struct imp_emitter *e, imp_v3 w)
 {
     const struct sunsky *s = e->self;
     const struct imp__weight_table *t = &s->table;
-    double p = in_disc(s, imp__dot(w, s->sun)) ? *s->sun_share / s->sun_solid : 0;
+    double p =
+        imp__sunsky_in_disc(s, imp__dot(w, s->sun)) ? *s->sun_share / s->sun_solid : 0;
     if (w[2] >= 0) {
         const double turn = atan2(w[1], w[0]) * (IMP_INV_PI / 2);
         const int i = imp_min((int)(w[2] * HEIGHTS), HEIGHTS - 1);
