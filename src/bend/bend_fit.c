@@ -5,38 +5,12 @@
  * may carry the optimiser's memory: steps s become P s and gradients g become P g / 8,
  * because eight fine coefficients share the gradient of a coarse one. Adam's rate is
  * halved. */
+#include "bend_fit.h"
 #include "base/lock.h"
-#include "bend_fingerprint.h"
-#include "lbfgs.h"
-#include "sobolev.h"
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
-struct fit {
-    imp_bend *b;
-    const struct imp_bend_fit_options *o;
-    struct imp__goal goal;
-    struct imp__opt_options opt;
-    struct imp__fingerprint print;
-    struct imp__sobolev metric;
-    uint8_t *held;
-    double *theta, *bar, *lo, *hi, *scale,
-        *x0;    /* [n_theta], of active numbers where [n] */
-    size_t *at; /* [n] index in theta */
-    /* Search and grid of the level before, whose memory is carried on. */
-    struct imp__search *last;
-    imp_field *coarse;
-    size_t *coarse_at; /* [last->n] */
-    bool carries;
-    int level, levels, done_iterations, n_evaluated;
-    double fraction_lo, fraction_hi, start_s, last_report_s, last_checkpoint_s;
-    double last_value, best_value, rays_done;
-    struct imp_bend_stats stats;
-    char note[80];
-};
-
-static void level_free(struct fit *f)
+static void level_free(struct imp__bend_run *f)
 {
     imp_context *ctx = f->b->ctx;
     imp__sobolev_destroy(&f->metric);
@@ -48,98 +22,7 @@ static void level_free(struct fit *f)
     f->at = NULL;
 }
 
-static enum imp_status theta_set(struct fit *f, const double *x)
-{
-    for (size_t k = 0; k < f->goal.n; k++) f->theta[f->at[k]] = x[k];
-    return imp_field_set_theta(f->b->field, f->theta);
-}
-
-static bool report(struct fit *f, bool force)
-{
-    const double now = imp__now();
-    if (!f->o->progress || (!force && now - f->last_report_s < 0.1)) return false;
-    f->last_report_s = now;
-    const double elapsed = now - f->start_s;
-    snprintf(f->note, sizeof f->note, "level %d of %d, objective %.4g", f->level + 1,
-             f->levels, f->best_value);
-    const double part = imp_min(1.0, (double)f->done_iterations / f->opt.max_iterations);
-    const double fraction = f->fraction_lo + (f->fraction_hi - f->fraction_lo) * part;
-    const struct imp_progress p = {
-        .size = sizeof p,
-        .stage = "fit",
-        .fraction = fraction,
-        .elapsed_s = elapsed,
-        .eta_s = fraction > 1e-3 ? elapsed * (1 - fraction) / fraction : -1,
-        .rate = elapsed > 0 ? f->rays_done / elapsed : 0,
-        .rate_unit = "rays",
-        .note = f->note};
-    return f->o->progress(&p, f->o->progress_payload) != 0;
-}
-
-static enum imp_status goal_eval(const double *x, uint64_t seed, struct imp_estimate *e,
-                                 double *g, double *g_se, void *payload)
-{
-    struct fit *f = payload;
-    (void)seed; /* the rays are fixed */
-    enum imp_status st = theta_set(f, x);
-    double value = 0;
-    if (st != IMP_OK) return st;
-    st = imp_bend_objective(f->b, &value, g ? f->bar : NULL, NULL, &f->stats);
-    if (st == IMP_E_NUMERIC && f->o->optimizer == IMP_LBFGS && f->n_evaluated > 0) {
-        value = INFINITY; /* every ray is lost: the line search takes a shorter step */
-        st = IMP_OK;
-    }
-    if (st != IMP_OK) return st;
-    f->n_evaluated++;
-    f->rays_done += (double)f->b->n;
-    f->last_value = value;
-    if (value < f->best_value) f->best_value = value;
-    *e = (struct imp_estimate){.value = value, .se = 0};
-    for (size_t k = 0; g && k < f->goal.n; k++) g[k] = f->bar[f->at[k]];
-    for (size_t k = 0; g_se && k < f->goal.n; k++) g_se[k] = 0;
-    return IMP_OK;
-}
-
-/* Calls the caller's function after an iteration. True: the fit is to stop. */
-static bool show_step(struct fit *f, const struct imp__search *s)
-{
-    const struct imp_bend_fit_step step = {
-        .size = sizeof step,
-        .level = f->level,
-        .levels = f->levels,
-        .iteration = s->iteration,
-        .value = s->n_history ? s->history[s->n_history - 1] : NAN};
-    return f->o->step && theta_set(f, s->x) == IMP_OK &&
-           f->o->step(&step, f->o->step_payload) != 0;
-}
-
-static enum imp_status goal_iterated(const struct imp__search *s, void *payload)
-{
-    struct fit *f = payload;
-    f->done_iterations = s->iteration;
-    const double now = imp__now();
-    if (f->o->checkpoint && now - f->last_checkpoint_s > 5) {
-        f->last_checkpoint_s = now;
-        const enum imp_status st =
-            imp__checkpoint_write(f->b->ctx, f->o->checkpoint, &f->print, s);
-        if (st != IMP_OK) return st;
-    }
-    const bool stops = show_step(f, s);
-    return report(f, false) || stops ? imp__error(f->b->ctx, IMP_CANCELLED, "%s",
-                                                  imp_status_text(IMP_CANCELLED))
-                                     : IMP_OK;
-}
-
-/* Active numbers by M of sobolev.h. */
-static void smoothed(double *x, void *payload)
-{
-    struct fit *f = payload;
-    for (size_t k = 0; k < f->goal.n; k++) f->bar[f->at[k]] = x[k];
-    imp__sobolev_apply(&f->metric, f->bar);
-    for (size_t k = 0; k < f->goal.n; k++) x[k] = f->bar[f->at[k]];
-}
-
-static enum imp_status level_begin(struct fit *f)
+static enum imp_status level_begin(struct imp__bend_run *f)
 {
     enum imp_status st = IMP_OK;
     imp_bend *b = f->b;
@@ -176,8 +59,8 @@ static enum imp_status level_begin(struct fit *f)
                                  .lo = f->lo,
                                  .hi = f->hi,
                                  .scale = f->scale,
-                                 .eval = goal_eval,
-                                 .iterated = goal_iterated,
+                                 .eval = imp__bend_fit_eval,
+                                 .iterated = imp__bend_fit_iterated,
                                  .payload = f};
     int iterations = 50;
     double rate = f->o->learning_rate > 0 ? f->o->learning_rate : 0.05;
@@ -195,7 +78,7 @@ out:
     return st;
 }
 
-static void last_free(struct fit *f)
+static void last_free(struct imp__bend_run *f)
 {
     imp__search_destroy(f->last);
     imp_field_destroy(f->coarse);
@@ -208,7 +91,7 @@ static void last_free(struct fit *f)
 /* Prolong active numbers of the coarse grid to those of the fine one; held ones are 0. */
 static enum imp_status carry_map(const double *in, double *out, void *payload)
 {
-    const struct fit *f = payload;
+    const struct imp__bend_run *f = payload;
     imp_context *ctx = f->b->ctx;
     enum imp_status st = IMP_OK;
     double *coarse = imp__alloc(ctx, f->coarse->n_theta + 1, sizeof *coarse);
@@ -223,7 +106,7 @@ out:
     return st;
 }
 
-static enum imp_status level_run(struct fit *f, bool resume, bool *found,
+static enum imp_status level_run(struct imp__bend_run *f, bool resume, bool *found,
                                  const char **reason, int *iterations)
 {
     enum imp_status st = IMP_OK, ended;
@@ -240,12 +123,12 @@ static enum imp_status level_run(struct fit *f, bool resume, bool *found,
         else IMP_TRY(imp__search_carry(f->last, &carry, s));
     }
     f->best_value = INFINITY;
-    const struct imp__lbfgs_metric metric = {smoothed, f};
+    const struct imp__lbfgs_metric metric = {imp__bend_fit_smoothed, f};
     ended = f->o->optimizer == IMP_LBFGS
                 ? imp__lbfgs(&f->goal, &f->opt, f->metric.work ? &metric : NULL, s)
                 : imp__optimize(&f->goal, &f->opt, s);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
-    IMP_TRY(theta_set(f, s->x));
+    IMP_TRY(imp__bend_fit_set(f, s->x));
     *reason = s->reason                ? s->reason
               : ended == IMP_CANCELLED ? "stopped"
                                        : "all iterations done";
@@ -270,7 +153,7 @@ out:
 }
 
 /* Refine the field to the next level. */
-static enum imp_status refine(struct fit *f)
+static enum imp_status refine(struct imp__bend_run *f)
 {
     imp_field *fine;
     const enum imp_status st = imp_field_refine(f->b->field, &fine);
@@ -285,7 +168,7 @@ static enum imp_status refine(struct fit *f)
 }
 
 /* Find the level the checkpoint belongs to, refining until it fits. */
-static enum imp_status resume(struct fit *f, bool *found, const char **reason,
+static enum imp_status resume(struct imp__bend_run *f, bool *found, const char **reason,
                               int *iterations)
 {
     enum imp_status st = IMP_OK;
@@ -322,11 +205,11 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
         return imp__error(b->ctx, IMP_E_UNSUPPORTED,
                           "smooth_length %g: only lbfgs takes smooth steps",
                           o->smooth_length);
-    struct fit f = {.b = b,
-                    .o = o,
-                    .levels = imp_max(o->levels, 1),
-                    .start_s = imp__now(),
-                    .stats = IMP_BEND_STATS_INIT};
+    struct imp__bend_run f = {.b = b,
+                              .o = o,
+                              .levels = imp_max(o->levels, 1),
+                              .start_s = imp__now(),
+                              .stats = IMP_BEND_STATS_INIT};
     enum imp_status st = IMP_OK;
     const char *reason = "nothing was done";
     int iterations = 0, first = 0;
@@ -384,7 +267,7 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
             (unsigned long long)(traced - f.stats.traced));
     f.best_value = value;
     f.done_iterations = f.opt.max_iterations;
-    report(&f, true);
+    imp__bend_fit_report(&f, true);
     if (result) {
         const struct imp_bend_fit_result all = {.size = sizeof all,
                                                 .iterations = iterations,
