@@ -2,10 +2,8 @@
  *
  * Sums of squared influences e_i over the samples of a picture, for pixels that share samples
  * (influence.h): tile by tile, with a cross term between neighbouring pixels. */
-#include "influence.h"
 #include "base/team.h"
-#include "film/film_tiles.h"
-#include "moved_pictures.h"
+#include "influence_pixel.h"
 #include <math.h>
 #include <string.h>
 
@@ -20,189 +18,8 @@ int imp__error_spp(int spp)
     return imp_max(2, imp_min(spp, imp_max(ERROR_SPP, spp / ERROR_SHARE)));
 }
 
-struct pass {
-    const struct imp__functional *f;
-    bool positions; /* the second pass: B in the place of A */
-    size_t n;       /* numbers F */
-    int border, spp;
-    int set;             /* samples that depend on each other, about */
-    int64_t period;      /* samples that are cut into such sets, of which spp are taken */
-    int64_t sets, parts; /* sets of a pixel that are taken; items of a tile */
-    struct imp_tiles tiles;
-    double *store; /* [tiles][doubles of a result] */
-};
-
-/* A tile's result: variance [n], then cross [region^2][n]. */
-static size_t region_side(const struct pass *p)
-{
-    /* One more than the filter reaches: a position may be rounded up to a pixel's end. */
-    return (size_t)(p->tiles.side + 2 * p->border + 1);
-}
-static size_t result_size(const struct pass *p)
-{
-    const size_t side = p->positions || !p->f->W ? 0 : region_side(p);
-    return p->n * (1 + side * side);
-}
-
-/* ---- One pixel -------------------------------------------------------------------- */
-
-/* What the samples of a pixel send, and room for one sample. */
-struct stratum {
-    size_t side; /* pixels that its samples reach, along an axis */
-    double *lane, *S;
-    double *a, *u;                /* [n], [side^2] of the set of samples at work */
-    double *sum, *square;         /* [n] of a over the sets */
-    double *sum_u, *cross;        /* [side^2] of u, [side^2][n] of u a */
-    double *value;                /* [n] s_p L_i of a pixel p, or s_p I_p */
-    struct imp_taps across, down; /* of the sample */
-};
-
-static bool stratum_create(const struct pass *p, struct imp_arena *arena,
-                           struct stratum *s)
-{
-    const struct imp__functional *f = p->f;
-    const size_t C = (size_t)f->channels, K = f->derivatives ? f->tracer.active->n : 0;
-    s->side = (size_t)(2 * p->border + 2);
-    const size_t area = s->side * s->side;
-    s->lane = imp__arena_take(arena, (K + 1) * C, sizeof(double));
-    s->S = imp__arena_take(arena, p->n * C, sizeof(double));
-    s->value = imp__arena_take(arena, p->n, sizeof(double));
-    s->a = imp__arena_take(arena, p->n, sizeof(double));
-    s->sum = imp__arena_take(arena, p->n, sizeof(double));
-    s->square = imp__arena_take(arena, p->n, sizeof(double));
-    s->u = imp__arena_take(arena, area, sizeof(double));
-    s->sum_u = imp__arena_take(arena, area, sizeof(double));
-    s->cross = imp__arena_take(arena, area * p->n, sizeof(double));
-    return s->lane && s->S && s->value && s->a && s->sum && s->square && s->u &&
-           s->sum_u && s->cross;
-}
-
-/* S [n][channels]: the sample's radiance, and the sums of its derivatives in groups; 0 if
- * its walk is dropped, which the picture has counted. */
-static bool sample_walk(const struct imp__functional *f, struct stratum *t,
-                        struct imp_sample *s, size_t n)
-{
-    const size_t C = (size_t)f->channels, K = f->derivatives ? f->tracer.active->n : 0;
-    bool finite = true;
-    s->value = t->lane;
-    if (f->derivatives) {
-        imp__moved_sample(f->moved, &f->tracer, s);
-    } else {
-        struct imp_walk walk;
-        imp__sample_walk(s, &f->tracer, &walk);
-        for (size_t c = 0; c < C; c++) t->lane[c] = walk.L[c];
-    }
-    if (s->dropped == IMP_DROP_MEMORY) return false;
-    for (size_t k = 0; k < (K + 1) * C; k++) finite &= isfinite(t->lane[k]);
-    memset(t->S, 0, n * C * sizeof *t->S);
-    if (s->dropped != IMP_DROP_NONE || !finite) return true;
-    memcpy(t->S, t->lane, C * sizeof *t->S);
-    for (size_t k = 0; k < K; k++)
-        for (size_t c = 0; c < C; c++)
-            t->S[(size_t)(1 + f->group[k]) * C + c] += t->lane[(k + 1) * C + c];
-    return true;
-}
-
-/* value [n] = sum over channels of s_p times the sample's, or the pictures' at p. */
-static void pixel_value(const struct pass *p, struct stratum *t, size_t pixel)
-{
-    const struct imp__functional *f = p->f;
-    const size_t C = (size_t)f->channels, stride = (size_t)f->picture->channels;
-    const float *s = f->adjoint + pixel * C;
-    memset(t->value, 0, p->n * sizeof *t->value);
-    for (size_t c = 0; c < C; c++)
-        t->value[0] += (double)s[c] * f->picture->mean[pixel * stride + c];
-    for (size_t k = 0; f->derivatives && k < f->tracer.active->n; k++)
-        for (size_t c = 0; c < C; c++)
-            t->value[1 + f->group[k]] += (double)s[c] * f->films[k]->mean[pixel * C + c];
-}
-static void sample_value(const struct pass *p, struct stratum *t, size_t pixel)
-{
-    const size_t C = (size_t)p->f->channels;
-    const float *s = p->f->adjoint + pixel * C;
-    for (size_t g = 0; g < p->n; g++) {
-        t->value[g] = 0;
-        for (size_t c = 0; c < C; c++) t->value[g] += s[c] * t->S[g * C + c];
-    }
-}
-
-static void sample_taps(const struct imp__functional *f, const struct imp_sample *s,
-                        struct stratum *t)
-{
-    const struct imp_film_desc *film = f->film;
-    if (!f->W) {
-        t->across = (struct imp_taps){.first = s->x, .n = 1, .w = {1}};
-        t->down = (struct imp_taps){.first = s->y, .n = 1, .w = {1}};
-        return;
-    }
-    const int b = imp__film_border(film);
-    imp__film_taps(&film->filter, s->px - film->crop_x, imp_max(s->x - b, 0),
-                   imp_min(s->x + b + 1, film->crop_w - 1), &t->across);
-    imp__film_taps(&film->filter, s->py - film->crop_y, imp_max(s->y - b, 0),
-                   imp_min(s->y + b + 1, film->crop_h - 1), &t->down);
-}
-
-/* a += A_i or B_i, u += u_i. */
-static bool sample_add(const struct pass *p, struct stratum *t, struct imp_sample *s)
-{
-    const struct imp__functional *f = p->f;
-    if (p->positions)
-        imp__walk_position(&f->tracer, s->x, s->y, s->index, &s->px, &s->py);
-    else if (!sample_walk(f, t, s, p->n)) return false;
-    sample_taps(f, s, t);
-    for (int j = 0; j < t->down.n; j++)
-        for (int i = 0; i < t->across.n; i++) {
-            const int x = t->across.first + i, y = t->down.first + j;
-            const size_t pixel = (size_t)y * (size_t)f->film->crop_w + (size_t)x;
-            const double W = f->W ? f->W[pixel] : f->spp;
-            if (W == 0) continue;
-            const double u = t->down.w[j] * t->across.w[i] / W;
-            t->u[(size_t)(y - s->y + p->border) * t->side +
-                 (size_t)(x - s->x + p->border)] += u;
-            if (p->positions) pixel_value(p, t, pixel);
-            else sample_value(p, t, pixel);
-            for (size_t g = 0; g < p->n; g++) t->a[g] += u * t->value[g];
-        }
-    return true;
-}
-
-/* The set of samples is complete. */
-static void set_end(const struct pass *p, struct stratum *t, bool cross)
-{
-    for (size_t g = 0; g < p->n; g++) {
-        t->sum[g] += t->a[g];
-        t->square[g] += t->a[g] * t->a[g];
-    }
-    for (size_t k = 0; cross && k < t->side * t->side; k++) {
-        if (t->u[k] == 0) continue;
-        t->sum_u[k] += t->u[k];
-        for (size_t g = 0; g < p->n; g++) t->cross[k * p->n + g] += t->u[k] * t->a[g];
-        t->u[k] = 0;
-    }
-    memset(t->a, 0, p->n * sizeof *t->a);
-}
-
-/* Add a pixel's sums over m sets to the tile's. */
-static void stratum_end(const struct pass *p, const struct imp_tile *tile, int x, int y,
-                        int64_t m, struct stratum *t, double *result, bool cross)
-{
-    const double factor = m > 1 ? (double)m / (double)(m - 1) : INFINITY;
-    const double each = 1. / (double)m;
-    for (size_t g = 0; g < p->n; g++)
-        result[g] += factor * fmax(t->square[g] - t->sum[g] * t->sum[g] * each, 0);
-    for (size_t k = 0; cross && m > 1 && k < t->side * t->side; k++) {
-        const size_t row = (size_t)(y - tile->y0) + k / t->side,
-                     column = (size_t)(x - tile->x0) + k % t->side;
-        double *to = result + p->n * (1 + row * region_side(p) + column);
-        for (size_t g = 0; g < p->n; g++)
-            to[g] += factor * (t->cross[k * p->n + g] - t->sum_u[k] * t->sum[g] * each);
-    }
-}
-
-/* ---- A pass ------------------------------------------------------------------------- */
-
 /* First sample of a part: parts end with sets. */
-static int64_t part_begin(const struct pass *p, size_t part)
+static int64_t part_begin(const struct imp__influence_pass *p, size_t part)
 {
     const int64_t all = p->period / p->set;
     return p->sets * (int64_t)part / p->parts * p->period / all;
@@ -211,12 +28,12 @@ static int64_t part_begin(const struct pass *p, size_t part)
 static enum imp_status tile_work(const struct imp_tile *tile, struct imp_tile_worker *w,
                                  void *result, void *payload)
 {
-    const struct pass *p = payload;
+    const struct imp__influence_pass *p = payload;
     const bool cross = !p->positions && p->f->W;
     const int64_t s0 = part_begin(p, tile->part), s1 = part_begin(p, tile->part + 1);
-    struct stratum t;
-    memset(result, 0, result_size(p) * sizeof(double));
-    if (!stratum_create(p, &w->arena, &t))
+    struct imp__influence_pixel t;
+    memset(result, 0, imp__influence_size(p) * sizeof(double));
+    if (!imp__influence_pixel_create(p, &w->arena, &t))
         return imp__error(p->tiles.ctx, IMP_E_NOMEM, "no memory for standard errors");
     const size_t area = t.side * t.side;
     for (int y = tile->y0; y < tile->y1; y++)
@@ -235,16 +52,16 @@ static enum imp_status tile_work(const struct imp_tile *tile, struct imp_tile_wo
                 s.index = imp__tracer_sets(&p->f->tracer)
                               ? imp__set_number(p->set, p->period, k)
                               : k;
-                const bool good = sample_add(p, &t, &s);
+                const bool good = imp__influence_pixel_add(p, &t, &s);
                 imp__arena_rewind(&w->arena, mark);
                 if (!good)
                     return imp__error(p->tiles.ctx, IMP_E_NOMEM,
                                       "no memory to record a walk");
                 if (k + 1 < first + n_set) continue;
-                set_end(p, &t, cross);
+                imp__influence_pixel_set_end(p, &t, cross);
                 m++;
             }
-            stratum_end(p, tile, x, y, m, &t, result, cross);
+            imp__influence_pixel_end(p, tile, x, y, m, &t, result, cross);
             const enum imp_status st = imp__tile_check(w);
             if (st != IMP_OK) return st;
         }
@@ -253,7 +70,7 @@ static enum imp_status tile_work(const struct imp_tile *tile, struct imp_tile_wo
 
 static void tile_add(void *into, const void *from, void *payload)
 {
-    const size_t n = result_size(payload);
+    const size_t n = imp__influence_size(payload);
     const double *b = from;
     double *a = into;
     for (size_t k = 0; k < n; k++) a[k] += b[k];
@@ -261,17 +78,17 @@ static void tile_add(void *into, const void *from, void *payload)
 
 static enum imp_status tile_take(size_t tile, const void *sum, void *payload)
 {
-    const struct pass *p = payload;
-    const size_t n = result_size(p);
+    const struct imp__influence_pass *p = payload;
+    const size_t n = imp__influence_size(p);
     memcpy(p->store + tile * n, sum, n * sizeof *p->store);
     return IMP_OK;
 }
 
 /* All tiles, in their order. */
-static void tiles_gather(const struct pass *p, struct imp__influence *out)
+static void tiles_gather(const struct imp__influence_pass *p, struct imp__influence *out)
 {
     const int width = p->f->film->crop_w, height = p->f->film->crop_h;
-    const size_t n = result_size(p), region = region_side(p);
+    const size_t n = imp__influence_size(p), region = imp__influence_side(p);
     for (size_t k = 0; k < imp__tiles_count(&p->tiles); k++) {
         const double *from = p->store + k * n;
         const int across = p->tiles.across, side = p->tiles.side;
@@ -289,7 +106,7 @@ static void tiles_gather(const struct pass *p, struct imp__influence *out)
 }
 
 /* Whole sets of the picture's, two at least: those of fewer points have another variance. */
-static void sets_plan(const struct imp__functional *f, struct pass *p)
+static void sets_plan(const struct imp__functional *f, struct imp__influence_pass *p)
 {
     const int least = imp__error_spp(f->spp);
     p->period = imp_max(f->spp, 2);
@@ -306,10 +123,10 @@ static enum imp_status pass_run(imp_context *ctx, const struct imp__functional *
 {
     enum imp_status st = IMP_OK;
     struct imp_run own = *run;
-    struct pass p = {.f = f,
-                     .positions = positions,
-                     .n = (size_t)f->n_groups + 1,
-                     .border = f->W ? imp__film_border(f->film) : 0};
+    struct imp__influence_pass p = {.f = f,
+                                    .positions = positions,
+                                    .n = (size_t)f->n_groups + 1,
+                                    .border = f->W ? imp__film_border(f->film) : 0};
     sets_plan(f, &p);
     const int width = f->film->crop_w, height = f->film->crop_h;
     if (f->tracer.kept && (f->tracer.kept->source.set > 0 || f->tracer.kept->n < 2))
@@ -334,7 +151,7 @@ static enum imp_status pass_run(imp_context *ctx, const struct imp__functional *
                                  .take = tile_take,
                                  .payload = &p};
     IMP_TRY(imp__tiles_create(&p.tiles));
-    p.tiles.size = result_size(&p) * sizeof(double);
+    p.tiles.size = imp__influence_size(&p) * sizeof(double);
     p.store = imp__alloc(ctx, imp__tiles_count(&p.tiles), p.tiles.size);
     out->variance = imp__alloc(ctx, p.n, sizeof *out->variance);
     if (!positions && f->W)
@@ -373,8 +190,8 @@ enum imp_status imp__influence_errors(imp_context *ctx, const struct imp__functi
 {
     enum imp_status st = IMP_OK;
     struct imp__influence known = {0};
-    struct stratum t = {0};
-    struct pass p = {.f = f, .n = (size_t)f->n_groups + 1};
+    struct imp__influence_pixel t = {0};
+    struct imp__influence_pass p = {.f = f, .n = (size_t)f->n_groups + 1};
     sets_plan(f, &p);
     const double samples = (double)f->spp / p.spp;
     t.value = imp__alloc(ctx, p.n, sizeof *t.value);
@@ -384,7 +201,7 @@ enum imp_status imp__influence_errors(imp_context *ctx, const struct imp__functi
         se[g] = influence->variance[g] + (f->W ? known.variance[g] : 0);
     for (size_t q = 0; f->W && q < (size_t)f->film->crop_w * (size_t)f->film->crop_h;
          q++) {
-        pixel_value(&p, &t, q);
+        imp__influence_pixel_value(&p, &t, q);
         for (size_t g = 0; g < p.n; g++)
             se[g] -= 2 * t.value[g] * influence->cross[q * p.n + g];
     }
