@@ -83,10 +83,10 @@ void imp__xml_include(struct xml_file *f, const char *name, const char *slot,
 void imp__xml_start(struct xml_file *f, const char *tag, const char **attributes);
 void imp__xml_end(struct xml_file *f);
 
-/* ---- What tags do: xml_props.c, xml_transform.c -------------------------------- */
+/* ---- What tags do: xml_props.c, xml_settings.c, xml_transform.c ----------------- */
 typedef void imp__xml_act(struct xml_file *f, const struct xml_attributes *a);
 imp__xml_act imp__xml_integer, imp__xml_float, imp__xml_boolean, imp__xml_string,
-    imp__xml_vector, imp__xml_rgb, imp__xml_spectrum;
+    imp__xml_vector, imp__xml_rgb, imp__xml_spectrum, imp__xml_set;
 imp__xml_act imp__xml_translate, imp__xml_scale, imp__xml_rotate, imp__xml_matrix,
     imp__xml_lookat;
 
