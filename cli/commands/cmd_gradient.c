@@ -4,12 +4,10 @@
  * parameters, with standard errors. The objective is a loss against target pictures; or
  * the inner product of the picture with a given adjoint image; or, with neither, the mean
  * of the picture over its pixels and channels. */
-#include "shared/blocks.h"
+#include "gradient_answer.h"
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "shared/picture_files.h"
-#include "shared/places.h"
-#include "shared/plot.h"
 #include "shared/problem_options.h"
 #include "shared/proof.h"
 #include "shared/ranks.h"
@@ -39,15 +37,6 @@ static const struct arg_option options[] = {
      "with --until: samples by tile: variance (default; of the gradient), or even",
      &allocation, 0, 0, allocation_words},
     {0}};
-
-struct result {
-    struct imp_estimate value;
-    const char *functional; /* "loss", "mean" or "adjoint" */
-    double *x, *grad, *se;
-    int rounds, spp; /* of the run, each with spp samples at first */
-    int spp_taken;   /* by a round's gradient: of the target with most of them */
-    struct imp_until_end end;
-};
 
 /* The adjoint image: from the file, or 1 / (number of pixels and channels) everywhere. */
 static int adjoint_image(const struct imp_run *run, float **seed)
@@ -83,7 +72,7 @@ static int adjoint_image(const struct imp_run *run, float **seed)
 
 /* One estimate of value, gradient and errors with the random numbers of `run`. */
 static enum imp_status estimate(imp_problem *problem, const struct imp_run *run,
-                                const float *seed, struct result *r)
+                                const float *seed, struct gradient_answer *r)
 {
     if (!seed)
         return imp_problem_objective(problem, NULL, run, &r->value, r->grad, r->se);
@@ -97,7 +86,8 @@ static void merge(double *mean, double *se, double k, double value, double value
     *se = hypot(k * *se, value_se) / (k + 1);
 }
 
-static void add_round(struct result *sum, const struct result *r, size_t n)
+static void add_round(struct gradient_answer *sum, const struct gradient_answer *r,
+                      size_t n)
 {
     const double k = sum->rounds++;
     merge(&sum->value.value, &sum->value.se, k, r->value.value, r->value.se);
@@ -111,12 +101,12 @@ static void add_round(struct result *sum, const struct result *r, size_t n)
  * shows how many samples fit, or is the answer if no more do. The mean of unbiased
  * estimates is one, and rounds that were done survive an interrupt. */
 static int estimate_for(imp_problem *problem, struct imp_run run, const float *seed,
-                        struct result *sum)
+                        struct gradient_answer *sum)
 {
     enum { SMALL = 4 }; /* replicates need two */
     const size_t n = imp_problem_n_variables(problem);
     const double start = ranks_same(cli_now());
-    struct result r = *sum;
+    struct gradient_answer r = *sum;
     enum imp_status st = IMP_OK;
     r.grad = cli_alloc(n, sizeof *r.grad);
     r.se = cli_alloc(n, sizeof *r.se);
@@ -151,7 +141,7 @@ static int estimate_for(imp_problem *problem, struct imp_run run, const float *s
 }
 
 static enum imp_status estimate_until(imp_problem *problem, struct imp_run run,
-                                      const float *seed, struct result *r)
+                                      const float *seed, struct gradient_answer *r)
 {
     struct imp_until_options options = until_options(until, &run);
     if (allocation) options.allocation = IMP_ALLOCATION_EVEN;
@@ -169,7 +159,8 @@ static int failed(enum imp_status st)
                      "--until, what was done is kept");
 }
 
-static int compute(imp_problem *problem, const struct imp_run *run, struct result *r)
+static int compute(imp_problem *problem, const struct imp_run *run,
+                   struct gradient_answer *r)
 {
     float *seed = NULL;
     int rc = 0;
@@ -197,132 +188,10 @@ static int compute(imp_problem *problem, const struct imp_run *run, struct resul
     return rc;
 }
 
-/* ---- Answers ------------------------------------------------------------------- */
-
-static void print_json(const struct imp_run *run, const struct result *r,
-                       const struct block *blocks, size_t n_blocks, char **paths)
-{
-    static const char *const bias[] = {"none", "O(1/N)", "O(1/N^2)"};
-    struct json j = cli_json();
-    json_seed(&j, "seed", run->seed);
-    json_integer(&j, "spp", (int64_t)r->spp * r->rounds);
-    json_integer(&j, "spp_taken", (int64_t)r->spp_taken * r->rounds);
-    json_text(&j, "functional", r->functional);
-    if (!strcmp(r->functional, "loss")) json_text(&j, "loss", loss_word());
-    json_number(&j, "value", r->value.value);
-    json_number(&j, "se", r->value.se);
-    json_text(
-        &j, "bias",
-        bias[r->value.bias_order >= 0 && r->value.bias_order <= 2 ? r->value.bias_order
-                                                                  : 0]);
-    if (until > 0) until_json(&j, until, &r->end);
-    json_array(&j, "params");
-    for (size_t k = 0; k < n_blocks; k++) {
-        const struct block *b = &blocks[k];
-        block_json(&j, b);
-        if (block_is_large(b)) {
-            json_integer(&j, "count", (int64_t)b->n);
-            json_text(&j, "file", paths[k]);
-        } else if (b->n == 1) {
-            json_number(&j, "value", r->x[b->first]);
-            json_number(&j, "grad", r->grad[b->first]);
-            json_number(&j, "se", r->se[b->first]);
-        } else {
-            json_numbers(&j, "value", b->n, r->x + b->first);
-            json_numbers(&j, "grad", b->n, r->grad + b->first);
-            json_numbers(&j, "se", b->n, r->se + b->first);
-        }
-        json_end_object(&j);
-    }
-    json_end_array(&j);
-    places_json(&j, blocks, n_blocks, NULL);
-    cli_json_end(&j);
-}
-
-static void print_text(const struct result *r, const struct block *blocks,
-                       size_t n_blocks, char **paths)
-{
-    int width = 9;
-    for (size_t k = 0; k < n_blocks; k++)
-        if ((int)strlen(blocks[k].info.name) + 3 > width)
-            width = (int)strlen(blocks[k].info.name) + 3;
-    printf("%-*s  %-14.8g +- %.2g%s%s\n\n", width, r->functional, r->value.value,
-           r->value.se,
-           !strcmp(r->functional, "mean") ? "  (of the picture: all pixels and channels)"
-                                          : "",
-           r->value.bias_order == 1   ? "  (biased, O(1/N))"
-           : r->value.bias_order == 2 ? "  (biased, O(1/N^2))"
-                                      : "");
-    printf("%-*s  %-14s %-14s %s\n", width, "parameter", "value", "gradient", "se");
-    for (size_t k = 0; k < n_blocks; k++) {
-        const struct block *b = &blocks[k];
-        char name[512];
-        if (block_is_large(b)) {
-            double norm = 0, sum = 0;
-            for (size_t i = 0; i < b->n; i++) {
-                norm += r->grad[b->first + i] * r->grad[b->first + i];
-                sum += r->grad[b->first + i];
-            }
-            printf("%-*s  %zu numbers: sum of gradient %.6g, norm %.6g%s%s\n", width,
-                   b->info.name, b->n, sum, sqrt(norm), paths[k] ? " -> " : "",
-                   paths[k] ? paths[k] : "");
-            continue;
-        }
-        for (size_t i = 0; i < b->n; i++) {
-            const size_t at = b->first + i;
-            printf("%-*s  %-14.8g ", width,
-                   cli_number_row(&b->info, i, name, sizeof name), r->x[at]);
-            if (block_held(b, i)) printf("held\n");
-            else printf("%-14.7g %.2g\n", r->grad[at], r->se[at]);
-        }
-    }
-}
-
-/* ---- Plots of spectra -------------------------------------------------------------- */
-
-static char *plot_path(const struct block *b)
-{
-    const size_t n = strlen(b->info.name) + 5;
-    char *name = cli_alloc(n, 1);
-    snprintf(name, n, "%s.svg", b->info.name);
-    make_file_name(name);
-    char *path = join_path(spectra, name);
-    free(name);
-    return path;
-}
-
-/* A number of the spectrum moves a hat about its wavelength: by the hat's area the
- * derivative is that by the spectrum itself, per nm. */
-static int plot_block(const struct block *b, const struct result *r)
-{
-    const double *nm = b->info.wavelengths_nm;
-    double *y = cli_alloc(2 * b->n, sizeof *y), *se = y + b->n;
-    char label[256], *path = plot_path(b);
-    double most = 0;
-    for (size_t k = 0; k < b->n; k++) {
-        const double area = 0.5 * (nm[k + 1 < b->n ? k + 1 : k] - nm[k ? k - 1 : k]);
-        y[k] = r->grad[b->first + k] / area;
-        se[k] = r->se[b->first + k] / area;
-        most = fmax(most, fabs(y[k]));
-    }
-    const double power = most > 0 ? 3 * floor(log10(most) / 3) : 0;
-    for (size_t k = 0; k < 2 * b->n; k++) y[k] *= pow(10, -power);
-    if (power == 0) snprintf(label, sizeof label, "d %s per nm", r->functional);
-    else snprintf(label, sizeof label, "d %s per nm, 1e%g", r->functional, power);
-    const int rc = plot_spectrum(path, b->info.name, label, b->n, nm, y, se);
-    free(path);
-    free(y);
-    return rc;
-}
-static int is_spectrum(const struct block *b)
-{
-    return b->info.wavelengths_nm && b->n > 1;
-}
-
 static int run_gradient(int n, char **operand)
 {
     imp_problem *problem = NULL;
-    struct result r = {.functional = "", .end = IMP_UNTIL_END_INIT};
+    struct gradient_answer r = {.functional = "", .end = IMP_UNTIL_END_INIT};
     struct block *blocks = NULL;
     char **paths = NULL;
     size_t n_blocks = 0;
@@ -349,8 +218,8 @@ static int run_gradient(int n, char **operand)
         if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], textures, 1);
     if (spectra && !rc) rc = make_folder(spectra);
     for (size_t k = 0; k < n_blocks && !rc && spectra; k++)
-        if (is_spectrum(&blocks[k])) {
-            char *path = plot_path(&blocks[k]);
+        if (gradient_is_spectrum(&blocks[k])) {
+            char *path = gradient_plot_path(spectra, &blocks[k]);
             rc = overwrite_check(path, OUTPUT_CURVE);
             free(path);
         }
@@ -361,13 +230,13 @@ static int run_gradient(int n, char **operand)
     if (!rc) rc = manifest_numbers("gradient", r.grad, n_x);
     if (!rc) rc = manifest_numbers("errors of the gradient", r.se, n_x);
     for (size_t k = 0; k < n_blocks && !rc && spectra; k++)
-        if (is_spectrum(&blocks[k])) rc = plot_block(&blocks[k], &r);
+        if (gradient_is_spectrum(&blocks[k])) rc = gradient_plot(spectra, &blocks[k], &r);
     for (size_t k = 0; k < n_blocks && !rc && textures; k++)
         if (block_is_large(&blocks[k]))
             rc = block_write(&blocks[k], r.grad, r.se, textures, &paths[k]);
     if (!rc) {
-        if (cli.json) print_json(&run, &r, blocks, n_blocks, paths);
-        else print_text(&r, blocks, n_blocks, paths);
+        if (cli.json) gradient_json(&run, until, &r, blocks, n_blocks, paths);
+        else gradient_print(&r, blocks, n_blocks, paths);
         if (until > 0) until_say("gradient", &r.end);
         for (size_t k = 0; k < n_blocks && !textures; k++)
             if (block_is_large(&blocks[k])) {
