@@ -25,27 +25,32 @@ from typing import TYPE_CHECKING, Any
 
 from ._c import VERSION as __version__
 from ._check import Check, CheckRow, Comparison, SelfTestRow, check, compare, selftest
+from ._context import set_threads, threads
+from ._daylight import Weather, Year, annual, weather
 from ._design import Design, Want, design
 from ._dictionary import cornell_box, load_dict
+from ._errors import (ArgumentError, BiasError, Cancelled, Error, FileError, ImportonWarning, NumericError, Part,
+                      OutOfMemoryError, ParameterError, PathsError, SceneError, UnsupportedError)
 from ._fit import Fit, FitVariable, fit
-from ._gradient import Estimate, Jacobian, Loss, functional, jacobian, loss, render_backward, render_forward
-from ._library import (ArgumentError, BiasError, Cancelled, Error, FileError, ImportonWarning, NumericError, Part,
-                       OutOfMemoryError, ParameterError, PathsError, Progress, SceneError, UnsupportedError,
-                       explained, library_path, set_threads, threads)
+from ._gradient import Estimate, Loss, functional, loss, render_backward, render_forward
+from ._jacobian import Jacobian, jacobian
+from ._library import explained, library_path
+from ._load import load_file, load_string, set_variant, variant
 from ._measure import MeasuredPhoto, Measurement, MeasureStage, measure
 from ._missing import Missing, missing
-from ._params import Gradient, ParameterInfo, SceneParameters, Values, traverse
+from ._params import ParameterInfo, SceneParameters, traverse
 from ._parts import PartsInfo, join_parts, merge, part, parts_info, team
 from ._picture import DroppedWalk, Picture, project, read, reduce, write
 from ._plan import Plan, PlanRow, lamps, plan, plan_improve, plan_map
 from ._progress import set_progress
-from ._daylight import Weather, Year, annual, weather
 from ._render import denoise, render, walk
 from ._report import report
 from ._rooms import GlareTable, Grid, Interval, Luminaire, Share, daylight_glare, glare, glare_table, grid, luminaires, shares
-from ._scene import Scene, Sensor, load_file, load_string, set_variant, variant
+from ._run import Progress
+from ._scene import Scene, Sensor
 from ._transform import ScalarTransform4f, Transform4f
 from ._until import Reached, functional_until, render_until
+from ._values import Gradient, Values
 from ._walks import Walks, keep, read_walks
 
 if TYPE_CHECKING:

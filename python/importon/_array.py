@@ -6,7 +6,8 @@ from typing import Any, Optional
 
 import numpy as np
 
-from ._library import ArgumentError, OutOfMemoryError, lib
+from ._errors import ArgumentError, OutOfMemoryError
+from ._library import lib
 
 _CPU = (1, 3, 11)  # DLPack device types whose memory a CPU reads: kDLCPU, CUDA's pinned, ROCm's
 

@@ -7,9 +7,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Optional
 
 from . import _c
-from ._library import choice, context, failure, integer, lib, make, not_inside, rows_of, run, warn_said
+from ._context import context, failure
+from ._library import choice, integer, lib, make, rows_of
 from ._picture import read, to_film
 from ._problem import Problem, check_scene, run_options
+from ._run import not_inside, run
 from ._scene import Scene
 
 

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import _c
-from ._array import address, numbers
-from ._library import context, lib, make
+from ._array import address
+from ._context import context
+from ._library import lib, make
 from ._problem import check_scene, run_options
 from ._rooms import call
 from ._scene import Scene

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Optional, Union
 
 from . import _c
-from ._library import ArgumentError, choice, decode, integer, lib, make, rows_of, text
+from ._errors import ArgumentError
+from ._library import choice, decode, integer, lib, make, rows_of, text
 from ._plan import lamps as lamp_names
 from ._problem import check_scene, run_options
 from ._rooms import call, luminaires

@@ -12,9 +12,13 @@ from typing import Any, Optional
 import numpy as np
 
 from ._array import address, numbers
-from ._library import ArgumentError, FileError, Handle, SceneError, context, lib, not_inside, text, warn_said
+from ._context import Handle, context, warn_said
+from ._errors import ArgumentError, FileError, SceneError
+from ._library import lib, text
+from ._load import _load_options
 from ._objects import grid_of, is_array, is_mesh, matrix_of, mesh_of, pixels_of
-from ._scene import Scene, _load_options
+from ._run import not_inside
+from ._scene import Scene
 from ._tables import TABLES
 from ._transform import Transform4f
 
@@ -313,5 +317,3 @@ def cornell_box(res: int = 256, spp: int = 64) -> dict[str, Any]:
         "large-box": {"type": "cube", "to_world": T().translate([-0.33, -0.4, -0.28]).rotate([0, 1, 0], 18.25)
                       .scale([0.3, 0.61, 0.3]), "bsdf": {"type": "ref", "id": "white"}},
     }
-
-

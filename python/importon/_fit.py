@@ -10,11 +10,13 @@ import numpy as np
 
 from . import _c
 from ._array import copy_doubles
-from ._library import choice, decode, failure, integer, lib, make, memory_bytes, rows_of, run, text
-from ._params import Values
+from ._context import failure
+from ._library import choice, decode, integer, lib, make, memory_bytes, rows_of, text
 from ._picture import read
 from ._problem import Problem, run_options, target_list
+from ._run import run
 from ._scene import Scene
+from ._values import Values
 
 
 class FitVariable(NamedTuple):

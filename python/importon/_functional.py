@@ -13,7 +13,8 @@ import numpy as np
 
 from . import _c
 from ._array import address, numbers
-from ._library import ArgumentError, lib
+from ._errors import ArgumentError
+from ._library import lib
 from ._params import find
 from ._picture import Picture
 from ._problem import Problem, check_scene, run_options

@@ -10,11 +10,15 @@ import numpy as np
 
 from . import _c
 from ._array import copy_doubles
+from ._context import Handle, failure
+from ._errors import ArgumentError
 from ._fit import Fit, variables
-from ._library import ArgumentError, Handle, decode, failure, integer, lib, make, not_inside, rows_of, run, text
+from ._library import decode, integer, lib, make, rows_of, text
 from ._missing import Missing
 from ._params import names_of
-from ._problem import Problem, _integers, _is_path, _one_target, is_photograph, is_raw, levels, push, run_options, target_list
+from ._photograph import integers_of, is_path, is_raw, levels
+from ._problem import Problem, _one_target, is_photograph, push, run_options, target_list
+from ._run import not_inside, run
 from ._scene import Scene
 
 _NOISE = ("read", "shot", "relative")
@@ -110,10 +114,10 @@ def _photo(scene: Scene, sensor: int, value: Any, weights: Any, clip: Any, noise
     """imp_photo."""
     by_light = noise if isinstance(noise, Mapping) else {}
     t, kept = _one_target(scene, value, sensor, weights, "l2", 0, None)
-    file = _integers(value) if _is_path(value) else None
+    file = integers_of(value) if is_path(value) else None
     p = make(_c.imp_photo, sensor=sensor, width=t.width, height=t.height, channels=t.channels, pixels=t.pixels,
              weights=t.weights, noise=0. if by_light else float(noise), step=1 / file[1] if file else 0.)
-    if clip is not None and (clip != "auto" or file or (_is_path(value) and is_raw(value))):
+    if clip is not None and (clip != "auto" or file or (is_path(value) and is_raw(value))):
         p.clipped = True
         p.low, p.high = levels(value, clip, is_photograph(scene, sensor))
     for key, number in by_light.items():
@@ -125,7 +129,7 @@ def _photo(scene: Scene, sensor: int, value: Any, weights: Any, clip: Any, noise
             raise ArgumentError("exif has no %r; it has %s" % (key, ", ".join(_EXIF)))
         setattr(p, key, float(number))
     keep.append(kept)
-    if _is_path(value):
+    if is_path(value):
         keep.append(text(value, "photos"))
         p.name = keep[-1]
     return p

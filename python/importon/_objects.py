@@ -12,7 +12,7 @@ from typing import Any, Optional
 import numpy as np
 
 from ._array import _import, numbers
-from ._library import ArgumentError
+from ._errors import ArgumentError
 
 _MESH = {"positions": ("vertex_positions", "positions", "vertices"), "normals": ("vertex_normals", "normals"),
          "uvs": ("vertex_texcoords", "uvs"), "indices": ("faces", "indices")}

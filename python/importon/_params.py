@@ -6,14 +6,16 @@ import ctypes
 import fnmatch
 import re
 import weakref
-from collections.abc import Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Iterable, Iterator, MutableMapping
 from typing import Any, NamedTuple, Optional
 
 import numpy as np
 
 from . import _c
 from ._array import address, numbers
-from ._library import ArgumentError, ParameterError, lib, make, not_inside, text
+from ._errors import ArgumentError, ParameterError
+from ._library import lib, make, text
+from ._run import not_inside
 from ._scene import Scene
 
 
@@ -359,39 +361,6 @@ def traverse(scene: Scene) -> SceneParameters:
     with scene.lock:
         scene.pointer  # refuses a closed one
         return SceneParameters(scene)
-
-
-class Values(Mapping):  # type: ignore[type-arg]
-    """Numbers by parameter: name -> float64 [shape of the parameter]. A name may be written
-    as `SceneParameters` takes it."""
-
-    def __init__(self, scene: Scene, values: dict[str, Any]) -> None:
-        self._scene, self._values = scene, values
-
-    def __getitem__(self, name: str) -> Any:
-        if name in self._values:
-            return self._values[name]
-        full = find(self._scene, name).name
-        if full not in self._values:
-            raise ParameterError("%s was not active" % full)
-        return self._values[full]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-    def __repr__(self) -> str:
-        return "{%s}" % ",\n ".join("%r: %s" % kv for kv in self._values.items())
-
-
-class Gradient(Values):
-    """Derivatives by parameter; `se` has one standard error of each number."""
-
-    def __init__(self, scene: Scene, values: dict[str, Any], se: dict[str, Any]) -> None:
-        super().__init__(scene, values)
-        self.se = Values(scene, se)
 
 
 def names_of(params: Any) -> Iterable[str]:

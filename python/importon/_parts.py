@@ -11,7 +11,9 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, Optional, Union
 
 from . import _c
-from ._library import ArgumentError, Context, Handle, Part, decode, integer, lib, make, own_context, text
+from ._context import Context, Handle, own_context
+from ._errors import ArgumentError, Part
+from ._library import decode, integer, lib, make, text
 
 
 class PartsInfo(NamedTuple):

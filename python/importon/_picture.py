@@ -11,8 +11,9 @@ import numpy as np
 
 from . import _c
 from ._array import numbers, view
-from ._library import (ArgumentError, Context, Handle, choice, context, decode, integer, lib, make, rows_of,
-                       text, warn_said, word)
+from ._context import Context, Handle, context, warn_said
+from ._errors import ArgumentError
+from ._library import choice, decode, integer, lib, make, rows_of, text, word
 
 
 class DroppedWalk(NamedTuple):

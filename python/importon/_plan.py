@@ -11,7 +11,8 @@ import numpy as np
 
 from . import _c
 from ._array import address, numbers
-from ._library import ArgumentError, choice, decode, integer, lib, make, rows_of, text
+from ._errors import ArgumentError
+from ._library import choice, decode, integer, lib, make, rows_of, text
 from ._picture import Picture, from_film
 from ._problem import Problem, check_scene, run_options
 from ._scene import Scene

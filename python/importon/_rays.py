@@ -10,9 +10,12 @@ import numpy as np
 
 from . import _c
 from ._array import address, copy_points, numbers
+from ._context import failure
+from ._errors import ArgumentError
 from ._field import Field
-from ._library import ArgumentError, failure, integer, lib, make, run
-from .elements import _struct
+from ._library import integer, lib, make
+from ._run import run
+from ._struct import struct_of
 
 #: One end of a ray, or its crossing of a tap (`struct imp_bend_exit`).
 EXIT = np.dtype([("x", "<f8", 3), ("v", "<f8", 3), ("path", "<f8"), ("tau", "<f8"), ("norm2", "<f8"),
@@ -65,12 +68,12 @@ class Options:
         for name in ("surfaces", "n_surfaces", "taps", "n_taps", "progress", "progress_payload"):
             if name in allowed:
                 raise TypeError("a trace has no option '%s'" % name)
-        self.struct, self.kept = _struct(_c.imp_bend_options, allowed, "a trace", _WORDS)
+        self.struct, self.kept = struct_of(_c.imp_bend_options, allowed, "a trace", _WORDS)
         rows = []
         for s in surfaces:
             s = dict(s)
             extra = {k: s.pop(k) for k in ("sdf", "scene") if k in s}
-            row, kept = _struct(_c.imp_bend_surface, s, "a surface", _SURFACE)
+            row, kept = struct_of(_c.imp_bend_surface, s, "a surface", _SURFACE)
             for k, v in extra.items():
                 setattr(row, k, v.pointer)
             rows.append(row)
@@ -78,7 +81,7 @@ class Options:
         self.surfaces = (_c.imp_bend_surface * max(len(rows), 1))(*rows)
         self.struct.n_surfaces = len(rows)
         self.struct.surfaces = ctypes.addressof(self.surfaces) if rows else None
-        planes = [_struct(_c.imp_bend_tap, t, "a tap")[0] for t in taps]
+        planes = [struct_of(_c.imp_bend_tap, t, "a tap")[0] for t in taps]
         self.taps = (_c.imp_bend_tap * max(len(planes), 1))(*planes)
         self.n_taps = self.struct.n_taps = len(planes)
         self.struct.taps = ctypes.addressof(self.taps) if planes else None

@@ -7,10 +7,12 @@ import json as _json
 from collections.abc import Mapping
 from typing import Any, Union
 
-from ._library import failure, integer, lib, not_inside, run
+from ._context import failure
+from ._library import integer, lib
 from ._params import SceneParameters
 from ._picture import Picture, from_film
 from ._problem import check_scene, push, run_options
+from ._run import not_inside, run
 from ._scene import Scene
 
 

@@ -8,7 +8,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Optional
 
 from . import _c
-from ._library import ArgumentError, context, integer, lib, make, text
+from ._context import context
+from ._errors import ArgumentError
+from ._library import integer, lib, make, text
 from ._picture import to_film
 
 _KEYS = ("kind", "name", "role", "unit", "view", "picture", "json", "image")

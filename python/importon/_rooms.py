@@ -10,9 +10,11 @@ import numpy as np
 
 from . import _c
 from ._array import address
-from ._library import decode, failure, lib, make, run
+from ._context import failure
+from ._library import decode, lib, make
 from ._params import SceneParameters
 from ._problem import check_scene, push, run_options
+from ._run import run
 from ._scene import Scene
 from ._until import Reached, _end, _options
 

@@ -11,7 +11,7 @@ from typing import Any, Callable, Optional
 import numpy as np
 
 from ._array import numbers
-from ._library import ArgumentError
+from ._errors import ArgumentError
 from ._objects import is_array
 
 # Reflectances of MERL's files are in these units, 1/sr (Matusik et al. 2003).

@@ -7,7 +7,7 @@ from typing import Any, Optional
 import numpy as np
 
 from ._array import numbers
-from ._library import ArgumentError
+from ._errors import ArgumentError
 
 
 class _Method:

@@ -11,11 +11,11 @@ from . import _c
 from ._array import address
 from ._gradient import Estimate, _adjoint
 from ._library import integer, lib, make
-from ._params import Gradient
 from ._picture import Picture
 from ._problem import Problem, check_scene, run_options
 from ._render import make_picture
 from ._scene import Scene
+from ._values import Gradient
 
 
 class Reached(NamedTuple):

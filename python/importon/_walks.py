@@ -9,9 +9,11 @@ import numpy as np
 
 from . import _c
 from ._array import address, numbers
-from ._library import (ArgumentError, Handle, context, decode, failure, lib, make, memory_bytes, not_inside, run,
-                       text, warn_said)
+from ._context import Handle, context, failure, warn_said
+from ._errors import ArgumentError
+from ._library import decode, lib, make, memory_bytes, text
 from ._problem import check_scene, push, run_options
+from ._run import not_inside, run
 from ._scene import Scene
 
 

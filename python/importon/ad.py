@@ -15,7 +15,9 @@ import numpy as np
 
 from . import _c
 from ._array import address, numbers
-from ._library import ArgumentError, choice, explained, failure, lib, make
+from ._context import failure
+from ._errors import ArgumentError
+from ._library import choice, explained, lib, make
 
 
 class Optimizer(MutableMapping):  # type: ignore[type-arg]

@@ -8,67 +8,25 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Optional
+from typing import Any, Optional
 
 import numpy as np
 
 from . import _c
 from ._array import copy_doubles, numbers
-from ._library import (ArgumentError, Handle, choice, explained, failure, integer, lib, make, not_inside,
-                       rows_of, run, text, warn_said)
-from ._params import Values
+from ._context import Handle, failure
+from ._elements_read import ElementsRead, Sensitivity
+from ._guide import Guide, guide
+from ._library import choice, explained, integer, lib, make, rows_of, text
 from ._picture import Picture, from_film
 from ._problem import Problem, check_scene
+from ._run import not_inside, run
 from ._scene import Scene
+from ._struct import structs_of
+from ._values import Values
 
 
-class Sensitivity(NamedTuple):
-    """A derivative of the measurement; `share` is value x derivative / measurement."""
-
-    name: str
-    param: int
-    element: int
-    emission: bool
-    value: float
-    derivative: float
-    share: float
-    share_error: float
-
-
-def _struct(kind: Any, given: Any, what: str, words: Mapping[str, str] = {}) -> tuple[Any, list[Any]]:
-    """A struct from a dictionary of its fields, and what it points to."""
-    if not isinstance(given, Mapping):
-        raise TypeError("%s is a %s: a dictionary is wanted" % (what, type(given).__name__))
-    s, kept = make(kind), []
-    known = dict((f[0], f[1]) for f in kind._fields_ if f[0] != "size")
-    for name, value in given.items():
-        if name not in known:
-            raise TypeError("%s has no '%s'; it has: %s" % (what, name, ", ".join(known)))
-        if name in words:
-            value = choice(words[name], value, name)
-        elif known[name] is ctypes.c_char_p:
-            value = text(value, name)
-            kept.append(value)
-        elif hasattr(known[name], "_length_"):
-            value = known[name](*[known[name]._type_(v) if known[name]._type_ is ctypes.c_int else v for v in (
-                [integer(x, name) for x in value] if known[name]._type_ is ctypes.c_int
-                else numbers(value, name, shape=(known[name]._length_,)).tolist())])
-        elif known[name] is ctypes.c_bool:
-            value = bool(value)
-        elif known[name] is ctypes.c_int:
-            value = integer(int(value) if isinstance(value, bool) else value, name)
-        elif known[name] is ctypes.c_double:
-            value = float(value)
-        setattr(s, name, value)
-    return s, kept
-
-
-def _structs(kind: Any, given: Sequence[Any], what: str, words: Mapping[str, str] = {}) -> tuple[Any, list[Any]]:
-    pairs = [_struct(kind, g, what, words) for g in given]
-    return (kind * max(len(pairs), 1))(*[p[0] for p in pairs]), [p[1] for p in pairs]
-
-
-class Elements:
+class Elements(ElementsRead):
     """A finite-element solution of a scene.
 
     Parameters
@@ -126,14 +84,14 @@ class Elements:
                       integer(int(v) if isinstance(v, bool) else v, k, 0 if known[k] is not ctypes.c_int else -2**31,
                               2**64 - 1 if known[k] is not ctypes.c_int else 2**31 - 1))
                   for k, v in options.items()}
-        self._kept = [_structs(_c.imp_elements_source, sources, "a source", {"kind": "imp_elements_source_kind"}),
-                      _structs(_c.imp_elements_phong, phong, "phong"), _structs(_c.imp_elements_beam, beams, "a beam")]
+        self._kept = [structs_of(_c.imp_elements_source, sources, "a source", {"kind": "imp_elements_source_kind"}),
+                      structs_of(_c.imp_elements_phong, phong, "phong"), structs_of(_c.imp_elements_beam, beams, "a beam")]
         arrays = [ctypes.addressof(k[0]) for k in self._kept]
         self._options = make(_c.imp_elements_options, n_sources=len(sources), sources=arrays[0] if sources else None,
                              n_phong=len(phong), phong=arrays[1] if phong else None, n_beams=len(beams),
                              beams=arrays[2] if beams else None, progress_payload=id(self), **values)
         self._context = scene._context
-        self._handle: Optional[Handle] = None
+        self._handle = None
         with scene.lock:
             out = ctypes.c_void_p()
             path = None if open is None else text(open, "open")
@@ -148,13 +106,6 @@ class Elements:
             self._handle = Handle(out.value or 0, lib.imp_elements_destroy)
         if path is None:
             self._solve(lib.imp_elements_solve, progress)
-
-    @property
-    def pointer(self) -> int:
-        self.scene.pointer  # it must be there, too
-        if self._handle is None:
-            raise ArgumentError("there is no solution")
-        return self._handle.pointer
 
     def _solve(self, function: Any, progress: Any) -> None:
         with self.scene.lock:
@@ -219,153 +170,6 @@ class Elements:
                 self.pointer, self.scene.sensor_index(sensor), choice("imp_elements_image", kind, "kind"),
                 integer(rays, "rays"), ctypes.byref(out)))
             return from_film(out.value)
-
-    @property
-    def info(self) -> dict[str, Any]:
-        """Sizes, memory, measurements and the schedule's log: what `struct imp_elements_info` has."""
-        with self.scene.lock:
-            i = make(_c.imp_elements_info)
-            self._context.check(lib.imp_elements_get_info(self.pointer, ctypes.byref(i)))
-            made = {f[0]: getattr(i, f[0]) for f in i._fields_ if f[0] not in ("size", "steps", "n_steps")}
-            made["measures"] = copy_doubles(i.measures, (i.n_measures,))
-            made["reason"] = (i.reason or b"").decode(errors="replace")
-            steps = rows_of(_c.imp_elements_step, i.steps, i.n_steps)
-            made["steps"] = [{f[0]: getattr(s, f[0]) for f in s._fields_ if f[0] != "size"} for s in steps]
-            return made
-
-    @property
-    def measures(self) -> Any:
-        """[n_sources]: each measurement by itself, without its weight."""
-        return self.info["measures"]
-
-    @property
-    def measure(self) -> float:
-        """The weighted measurements together."""
-        return float(self.info["measure"])
-
-    def sensitivity(self, errors: bool = False) -> list[Sensitivity]:
-        """Derivatives of the measurement to every light and material number, the largest
-        |value x derivative| first.
-
-        Parameters
-        ----------
-        errors : bool
-            Also the error of each share that the directional order makes; takes the time of
-            another solution.
-
-        Returns
-        -------
-        list of Sensitivity
-
-        Examples
-        --------
-        >>> scene = importon.load_dict(importon.cornell_box(res=8))
-        >>> rows = importon.elements.Elements(scene, stop=0.2).sensitivity()
-        >>> round(sum(r.share for r in rows if r.emission), 6)  # linear in the lights
-        1.0
-        """
-        not_inside()
-        function = lib.imp_elements_share_errors if errors else lib.imp_elements_sensitivity
-        with self.scene.lock:
-            rows, n = ctypes.c_void_p(), ctypes.c_size_t()
-            self._context.check(function(self.pointer, ctypes.byref(rows), ctypes.byref(n)))
-            found = rows_of(_c.imp_elements_row, rows.value, n.value)
-            return [Sensitivity(r.name.decode(errors="replace"), r.param, r.element, bool(r.emission), r.value,
-                                r.derivative, r.share, r.share_error) for r in found]
-
-    def element(self, index: int) -> dict[str, Any]:
-        """One element of the hierarchy, to be drawn.
-
-        Parameters
-        ----------
-        index : int
-            Below ``info["elements"]``.
-
-        Returns
-        -------
-        dict
-            What `struct imp_elements_element` has; `corner` as an array [corners][3], `parent` None
-            for whole polygons, `shape` None for measuring planes.
-
-        Examples
-        --------
-        >>> scene = importon.load_dict(importon.cornell_box(res=8))
-        >>> solution = importon.elements.Elements(scene, stop=0.2)
-        >>> solution.element(0)["level"], solution.element(0)["parent"]
-        (0, None)
-        """
-        not_inside()
-        with self.scene.lock:
-            x = make(_c.imp_elements_element)
-            self._context.check(lib.imp_elements_get_element(self.pointer, integer(index, "index", 0, 2**64 - 1), ctypes.byref(x)))
-            made = {f[0]: getattr(x, f[0]) for f in x._fields_ if f[0] != "size"}
-            made["shape"] = None if x.shape is None else x.shape.decode(errors="replace")
-            made["parent"] = None if x.parent == 2 ** (8 * ctypes.sizeof(ctypes.c_size_t)) - 1 else x.parent
-            made["corner"] = np.array(x.corner).reshape(4, 3)[:x.corners].copy()
-            for name in ("radiance", "irradiance"):
-                made[name] = np.array(made[name])
-            made["leaf"] = bool(x.leaf)
-            return made
-
-    def arrivals(self, index: int) -> Any:
-        """What arrives at an element, link by link, the brightest first.
-
-        Parameters
-        ----------
-        index : int
-
-        Returns
-        -------
-        ndarray
-            A structured array: `from` (an element), `irradiance` [3], `illuminance`, `measure` (of the
-            measurement: what passes here).
-
-        Examples
-        --------
-        >>> scene = importon.load_dict(importon.cornell_box(res=8))
-        >>> solution = importon.elements.Elements(scene, stop=0.2)
-        >>> rows, element = solution.arrivals(0), solution.element(0)
-        >>> bool(abs(rows["illuminance"].sum() - element["illuminance"]) < 1e-3 * element["illuminance"])
-        True
-        """
-        kind = np.dtype([("from", np.uintp), ("irradiance", float, 3), ("illuminance", float), ("measure", float)])
-        not_inside()
-        with self.scene.lock:
-            rows, n = ctypes.c_void_p(), ctypes.c_size_t()
-            self._context.check(lib.imp_elements_arrivals(self.pointer, integer(index, "index", 0, 2**64 - 1),
-                                                          ctypes.byref(rows), ctypes.byref(n)))
-            found = rows_of(_c.imp_elements_arrival, rows.value, n.value)
-            made = np.array([(getattr(r, "from"), tuple(r.irradiance), r.illuminance, r.measure) for r in found], kind)
-            lib.imp_free(self._context.pointer, rows)
-            return made
-
-    def illuminance(self, index: int, width: int, height: int) -> Any:
-        """Illuminance at points of the polygon of an element, each with its own visibility.
-
-        Parameters
-        ----------
-        index : int
-        width, height : int
-            Of cells along the polygon's first edge and along its last.
-
-        Returns
-        -------
-        ndarray
-            [height][width]; NaN outside a triangle.
-
-        Examples
-        --------
-        >>> scene = importon.load_dict(importon.cornell_box(res=8))
-        >>> solution = importon.elements.Elements(scene, [{"kind": "shape", "shape": "floor"}], stop=0.2)
-        >>> solution.illuminance(0, 4, 4).shape
-        (4, 4)
-        """
-        not_inside()
-        cells = (integer(width, "width", 1, 4096), integer(height, "height", 1, 4096))
-        out = np.empty((cells[1], cells[0]))
-        with self.scene.lock:
-            self._context.check(lib.imp_elements_illuminance(self.pointer, integer(index, "index", 0, 2**64 - 1), *cells, out.ctypes.data))
-        return out
 
     @explained
     def fit(self, targets: Any, params: Any = None, *, optimizer: Optional[str] = None, max_iterations: int = 0,
@@ -520,52 +324,8 @@ class ElementsFit(Values):
         return "\n".join(lines)
 
 
-class Guide:
-    """What walks are told about the light, to draw from: see `guide`."""
-
-    def __init__(self, elements: Elements, handle: Handle) -> None:
-        self.elements, self._handle = elements, handle
-
-    def _guide_pointer(self) -> int:
-        self.elements.pointer
-        return self._handle.pointer
-
-
-@explained
-def guide(elements: Elements, *, lights: bool = True, share: float = 0, roulette: float = 0) -> Guide:
-    """A solution as a guide for walks: it changes the noise of pictures and gradients, never
-    their mean.
-
-    Parameters
-    ----------
-    elements : Elements
-    lights : bool
-        Light samples follow what every light sends to a place; light walks begin by importance.
-    share : float
-        Of continuations drawn towards indirect light, or importance by light walks, 0 to 1.
-    roulette : float
-        Russian roulette of walks from the sensor by expected contribution; 0: off.
-
-    Returns
-    -------
-    Guide
-        For the keyword `guide` of `importon.render`, `importon.loss`, ...
-
-    Examples
-    --------
-    >>> scene = importon.load_dict(importon.cornell_box(res=8))
-    >>> guide = importon.guide(importon.elements.Elements(scene, stop=0.2))
-    >>> importon.render(scene, spp=4, guide=guide).shape
-    (8, 8, 3)
-    """
-    if not isinstance(elements, Elements):
-        raise TypeError("a guide is made from Elements, not from a %s" % type(elements).__name__)
-    options = make(_c.imp_elements_guide_options, no_lights=not lights, share=float(share), roulette=float(roulette))
-    with elements.scene.lock:
-        out = ctypes.c_void_p()
-        elements._context.check(lib.imp_elements_guide(elements.pointer, ctypes.byref(options), ctypes.byref(out)))
-        warn_said()
-        return Guide(elements, Handle(out.value or 0, lib.imp_guide_destroy))
-
+for _thing in (Guide, Sensitivity, guide):
+    _thing.__module__ = __name__  # known by the name that users import
+del _thing
 
 __all__ = ["Elements", "ElementsFit", "Guide", "Sensitivity", "guide"]

@@ -26,7 +26,7 @@ def _flat(function: Function, values: Mapping[str, Any]) -> Any:
 
 
 def _shape(info: Any, value: Any) -> Any:
-    from ._library import ArgumentError
+    from ._errors import ArgumentError
     raise ArgumentError("%s has shape %s, not %s" % (info.name, jnp.shape(value), info.shape))
 
 

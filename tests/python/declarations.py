@@ -10,7 +10,7 @@ import subprocess
 
 import importon
 from importon import _c
-from importon._library import ERRORS
+from importon._errors import ERRORS
 from tap import TOP, Skip, run
 
 HEADERS = ["importon.h", "bend.h", "elements.h", "plan.h", "measure.h", "report.h", "rooms.h", "design.h", "walks.h", "until.h", "clip.h"]

@@ -15,7 +15,7 @@ import numpy as np
 from tap import SCENES, TOP, Skip, needs, run
 
 MODULES = sorted(f[:-3] for f in os.listdir(os.path.dirname(importon.__file__))
-                 if f.endswith(".py") and f not in ("__init__.py", "_c.py", "torch.py", "jax.py"))
+                 if f.endswith(".py") and f not in ("__init__.py", "_c.py", "_torch_ops.py", "torch.py", "jax.py"))
 
 
 def examples(module, **more):
@@ -63,6 +63,13 @@ def test_jax_examples():
     return "%d lines" % examples(importon.jax, jax=jax, jnp=jnp)
 
 
+def members(thing, known):
+    """Of a class, and of classes that hold a part of it."""
+    parts = [c for c in reversed(thing.__mro__) if c is thing or (
+        c.__module__.startswith("importon") and c.__name__ not in (*importon.__all__, *known))]
+    return {name: value for c in parts for name, value in vars(c).items()}
+
+
 def public():
     """Everything public with its name: functions, classes, their methods and properties, of the
     package and of its modules."""
@@ -80,7 +87,7 @@ def public():
                 continue
             yield "%s.%s" % (module.__name__, name), thing
             if inspect.isclass(thing):
-                for method, value in vars(thing).items():
+                for method, value in members(thing, module.__all__).items():
                     if not method.startswith("_") and method != "pointer" and (
                             inspect.isfunction(value) or isinstance(value, (classmethod, staticmethod, property))):
                         yield "%s.%s.%s" % (module.__name__, name, method), getattr(thing, method) if not isinstance(
