@@ -67,12 +67,11 @@ static int tiff_bits(FILE *f, const char *header)
 
 static struct encoding encoding_of(const char *spec)
 {
-    static const char *const linear[] = {
-        "\x76\x2f\x31\x01", "\x93NUMPY", "PF", "Pf", "VOL", "#?"};
+    static const char *const linear[] = {"\x76\x2f\x31\x01", "PF", "Pf", "VOL", "#?"};
     const char *at = picture_sensor(spec) >= 0 ? strrchr(spec, '@') : NULL;
     char *path = at ? strndup(spec, (size_t)(at - spec)) : strdup(spec);
     FILE *f = path ? fopen(path, "rb") : NULL;
-    char header[64] = {0};
+    char header[1024] = {0};
     struct encoding e = {.srgb = f && fread(header, 1, sizeof header - 1, f) > 2,
                          .most = 255};
     int maxval;
@@ -86,6 +85,11 @@ static struct encoding encoding_of(const char *spec)
     free(path);
     for (size_t k = 0; k < sizeof linear / sizeof *linear; k++)
         if (!memcmp(header, linear[k], strlen(linear[k]))) e.srgb = false;
+    if (!memcmp(header, "\x93NUMPY", 6)) { /* of whole numbers by its dictionary's type */
+        const bool words = strstr(header + 10, "'<u2'") != NULL;
+        e.srgb = words || strstr(header + 10, "'|u1'") != NULL;
+        e.most = words ? 65535 : 255;
+    }
     e.jpeg = e.srgb && !memcmp(header, "\xff\xd8", 2);
     /* PNG: the depth is byte 24, behind width and height (RFC 2083, 11.2.1). */
     if (!memcmp(header, "\x89PNG", 4) && header[24] == 16) e.most = 65535;

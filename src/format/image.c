@@ -40,7 +40,7 @@ enum imp_status imp__image_parse(imp_context *ctx, const char *name,
     if (n >= 4 && memcmp(d, "\x76\x2f\x31\x01", 4) == 0)
         return imp__exr_parse(ctx, name, file, out);
     if (n >= 6 && memcmp(d, "\x93NUMPY", 6) == 0)
-        return imp__npy_parse(ctx, name, file, out);
+        return imp__npy_parse(ctx, name, file, out, srgb);
     if (n >= 3 && d[0] == 'P' && (d[1] == 'F' || d[1] == 'f'))
         return imp__pfm_parse(ctx, name, file, out);
     if (n >= 3 && memcmp(d, "VOL", 3) == 0) return imp__vol_picture(ctx, name, file, out);

@@ -36,14 +36,13 @@ enum imp_status imp__jpeg_parse(imp_context *ctx, const char *name,
                                 const struct imp_bytes *file, imp_film **out);
 enum imp_status imp__pfm_parse(imp_context *ctx, const char *name,
                                const struct imp_bytes *file, imp_film **out);
-enum imp_status imp__npy_parse(imp_context *ctx, const char *name,
-                               const struct imp_bytes *file, imp_film **out);
-
 enum imp_status imp__hdr_parse(imp_context *ctx, const char *name,
                                const struct imp_bytes *file, imp_film **out);
 enum imp_status imp__bmp_parse(imp_context *ctx, const char *name,
                                const struct imp_bytes *file, imp_film **out);
-/* *srgb is set here: false for files of floats. */
+/* *srgb is set in these: false for files of floats. */
+enum imp_status imp__npy_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out, bool *srgb);
 enum imp_status imp__tiff_parse(imp_context *ctx, const char *name,
                                 const struct imp_bytes *file, imp_film **out, bool *srgb);
 /* Is a TIFF file, of which it has the first four bytes, a DNG? Linear, white at 1. */

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * NumPy arrays (H, W, C) or (H, W): <f4 and <f8 in either order are read, <f4 is written.
- * The header is a Python dictionary, of which three entries are read. */
+ * NumPy arrays (H, W, C) or (H, W), rows or columns first. Floats, <f4 and <f8, are linear; whole
+ * numbers, |u1 and <u2, are those of a picture file, parts of 255 or 65535 in sRGB, as Mitsuba's
+ * Bitmap and Pillow take them. <f4 is written. The header is a Python dictionary, of which three
+ * entries are read. */
 #include "base/little.h"
 #include "base/number.h"
 #include "image.h"
@@ -39,11 +41,32 @@ static int shape_read(const char *s, uint64_t size[3])
     }
 }
 
-static double number_at(const unsigned char *d, int bytes)
+static const struct kind {
+    const char *descr;
+    int bytes;
+    double most; /* of whole numbers, which is 1 in the picture; 0: floats */
+} kinds[] = {{"<f4", 4, 0}, {"<f8", 8, 0}, {"|u1", 1, 255}, {"<u2", 2, 65535}};
+
+/* Text of a dictionary's value without its quotes, cut to the room that there is. */
+static void unquoted(const char *s, char *text, size_t size)
+{
+    const size_t n = s && *s == '\'' ? strcspn(s + 1, "'") : 0;
+    snprintf(text, size, "%.*s", (int)imp_min(n, size - 1), n ? s + 1 : "");
+}
+
+static const struct kind *kind_of(const char *descr)
+{
+    for (size_t k = 0; k < imp_count(kinds); k++)
+        if (strcmp(descr, kinds[k].descr) == 0) return &kinds[k];
+    return NULL;
+}
+
+static double number_at(const unsigned char *d, const struct kind *kind)
 {
     uint64_t bits = 0;
-    for (int k = 0; k < bytes; k++) bits |= (uint64_t)d[k] << (8 * k);
-    if (bytes == 8) {
+    for (int k = 0; k < kind->bytes; k++) bits |= (uint64_t)d[k] << (8 * k);
+    if (kind->most > 0) return (double)bits / kind->most;
+    if (kind->bytes == 8) {
         double v;
         memcpy(&v, &bits, sizeof v);
         return v;
@@ -55,7 +78,7 @@ static double number_at(const unsigned char *d, int bytes)
 }
 
 enum imp_status imp__npy_parse(imp_context *ctx, const char *name,
-                               const struct imp_bytes *file, imp_film **out)
+                               const struct imp_bytes *file, imp_film **out, bool *srgb)
 {
     const unsigned char *d = file->data;
     if (file->size < 12) return imp__error(ctx, IMP_E_SCENE, "%s: cut off", name);
@@ -68,25 +91,29 @@ enum imp_status imp__npy_parse(imp_context *ctx, const char *name,
     char *header = imp__alloc(ctx, length + 1, 1);
     if (!header) return imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", name);
     memcpy(header, d + start, length);
-    const char *type = entry(header, "descr"), *order = entry(header, "fortran_order");
+    char descr[32];
+    unquoted(entry(header, "descr"), descr, sizeof descr);
+    const struct kind *kind = kind_of(descr);
+    const char *order = entry(header, "fortran_order");
     uint64_t size[3] = {0, 0, 1};
     const int dims = shape_read(entry(header, "shape"), size);
-    const int bytes = !type                            ? 0
-                      : strncmp(type, "'<f4'", 5) == 0 ? 4
-                      : strncmp(type, "'<f8'", 5) == 0 ? 8
-                                                       : 0;
     const bool fortran = order && strncmp(order, "True", 4) == 0;
     const bool known = fortran || (order && strncmp(order, "False", 5) == 0);
     imp__release(ctx, header);
-    if (!bytes || !known || dims < 2)
+    if (!known || dims < 2)
+        return imp__error(ctx, IMP_E_SCENE, "%s: must be an array (H, W) or (H, W, C)",
+                          name);
+    if (!kind)
         return imp__error(ctx, IMP_E_SCENE,
-                          "%s: must be an array (H, W) or (H, W, C) of <f4 or <f8", name);
+                          "%s: an array of '%s': pictures are '<f4' or '<f8' (linear), "
+                          "'|u1' or '<u2' (sRGB); convert it with astype",
+                          name, descr);
     const uint64_t c = size[2], left = file->size - start - length;
     if (c < 1 || c > 4)
         return imp__error(ctx, IMP_E_SCENE, "%s: %llu channels; 1 to 4 are read", name,
                           (unsigned long long)c);
     if (size[0] > IMP_FILM_SIDE_MAX || size[1] > IMP_FILM_SIDE_MAX ||
-        size[0] * size[1] > left / ((uint64_t)bytes * c))
+        size[0] * size[1] > left / ((uint64_t)kind->bytes * c))
         return imp__error(ctx, IMP_E_SCENE, "%s: cut off", name);
     static const char *const names[] = {"Y", "Y,A", "R,G,B", "R,G,B,A"};
     imp_film *film;
@@ -99,8 +126,9 @@ enum imp_status imp__npy_parse(imp_context *ctx, const char *name,
     for (size_t i = 0; i < imp__film_values(film); i++) {
         const size_t y = i / (W * C), x = i / C % W, k = i % C;
         const size_t at = fortran ? y + H * (x + W * k) : i;
-        film->mean[i] = (float)number_at(d + at * (size_t)bytes, bytes);
+        film->mean[i] = (float)number_at(d + at * (size_t)kind->bytes, kind);
     }
+    *srgb = kind->most > 0;
     *out = film;
     return IMP_OK;
 }

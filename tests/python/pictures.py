@@ -115,6 +115,24 @@ def test_files():
     raises(TypeError, lambda: im.write(3, p))
 
 
+def test_npy_of_whole_numbers():
+    """NPY files of uint8 and uint16 are sRGB, as the PNG file of the same numbers, also as clipped targets"""
+    scene = box(8)
+    im.render(scene, spp=4).write("d.png", exposure=2)
+    png = np.asarray(im.read("d.png"))
+    words = np.where(png <= 0.0031308, 12.92 * png, 1.055 * np.maximum(png, 1e-9) ** (1 / 2.4) - 0.055)
+    words = np.round(255 * words).astype(np.uint8)
+    assert words.max() == 255
+    np.save("d.npy", words)
+    np.save("e.npy", words.astype(np.uint16) * 257)
+    assert (np.asarray(im.read("d.npy")) == png).all()
+    assert np.allclose(im.read("e.npy"), png, rtol=1e-6)
+    losses = [im.loss(scene, f, spp=4, clip="auto") for f in ("d.png", "d.npy")]
+    assert float(losses[0]) == float(losses[1])
+    np.save("f.npy", words.astype(np.int32))
+    raises(im.SceneError, lambda: im.read("f.npy"), "f.npy: an array of '<i4'")
+
+
 def test_compare():
     """compare: within noise, and not"""
     s = box()

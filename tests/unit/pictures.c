@@ -147,6 +147,65 @@ static void check_raw(void)
     imp_film_destroy(g);
 }
 
+/* Whole numbers are those of a picture file: sRGB, alpha linear. */
+static void check_npy_integers(void)
+{
+    static const unsigned char bytes[] = {0, 10, 188, 255, 64, 128, 255, 51};
+    static const struct {
+        const char *dictionary;
+        int C, bytes;
+        const char *refused;
+    } cases[] = {
+        {"{'descr': '|u1', 'fortran_order': False, 'shape': (1, 2, 4), }", 4, 1, NULL},
+        {"{'descr': '|u1', 'fortran_order': True, 'shape': (2, 4), }", 1, 1, NULL},
+        {"{'shape': (2, 2), 'fortran_order': False, 'descr': '<u2'}", 1, 2, NULL},
+        {"{'descr': '<i4', 'fortran_order': False, 'shape': (1, 2), }", 0, 0,
+         "a.npy: an array of '<i4': pictures are '<f4' or '<f8' (linear), '|u1' or "
+         "'<u2' (sRGB); convert it with astype"},
+        {"{'descr': '>u2', 'fortran_order': False, 'shape': (1, 2), }", 0, 0,
+         "a.npy: an array of '>u2': pictures are '<f4' or '<f8' (linear), '|u1' or "
+         "'<u2' (sRGB); convert it with astype"},
+        {"{'descr': [('x', '|u1')], 'fortran_order': False, 'shape': (1, 2), }", 0, 0,
+         "a.npy: an array of '': pictures are '<f4' or '<f8' (linear), '|u1' or "
+         "'<u2' (sRGB); convert it with astype"},
+        {"{'descr': '<u2', 'fortran_order': False, 'shape': (2, 3), }", 0, 0,
+         "a.npy: cut off"}};
+    for (size_t i = 0; i < imp_count(cases); i++) {
+        char path[256];
+        snprintf(path, sizeof path, "%s", in_folder("a.npy"));
+        FILE *to = fopen(path, "wb");
+        const size_t n = strlen(cases[i].dictionary);
+        fprintf(to, "%cNUMPY%c%c%c%c%s", 0x93, 1, 0, (int)n, 0, cases[i].dictionary);
+        fwrite(bytes, 1, sizeof bytes, to);
+        fclose(to);
+        imp_film *f = NULL;
+        const enum imp_status st = imp_film_read(ctx, path, &f);
+        if (cases[i].refused) {
+            const char *said = strstr(imp_last_error(ctx), "a.npy");
+            tap_ok(st == IMP_E_SCENE && said && !strcmp(said, cases[i].refused),
+                   "%s is refused # %s", cases[i].dictionary, imp_last_error(ctx));
+            imp_film_destroy(f);
+            continue;
+        }
+        double worst = st == IMP_OK ? 0 : INFINITY;
+        for (size_t k = 0; st == IMP_OK && k < imp__film_values(f); k++) {
+            const size_t C = (size_t)cases[i].C;
+            /* (2, 4) by columns: element (y, x) is byte y + 2 x. */
+            const size_t at = i == 1 ? k / 4 + 2 * (k % 4) : k;
+            const double v = cases[i].bytes == 1
+                                 ? bytes[at] / 255.
+                                 : (bytes[2 * at] + 256 * bytes[2 * at + 1]) / 65535.;
+            const double linear =
+                v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4);
+            const double want = C == 4 && k % C == 3 ? v : linear;
+            worst = fmax(worst, fabs((double)f->mean[k] - want));
+        }
+        tap_ok(worst < 1e-6 && f->channels == cases[i].C, "%s # off by %g %s",
+               cases[i].dictionary, worst, st ? imp_last_error(ctx) : "");
+        imp_film_destroy(f);
+    }
+}
+
 static void check_hdr(void)
 {
     for (int i = 0; i < 2; i++) {
@@ -280,6 +339,7 @@ int main(void)
     signal(SIGXFSZ, SIG_IGN);
     check_exr();
     check_raw();
+    check_npy_integers();
     check_hdr();
     check_png();
     check_atomic();
