@@ -232,8 +232,7 @@ void imp__splat_take(const struct imp__splat *s, int b, int set, size_t pixel, i
     for (int i = 0; i < n; i++) {
         double value[3];
         for (int c = 0; c < s->channels; c++) value[c] = walks[i].L[c];
-        if (imp_likely(imp__fits_float(value, s->channels)))
-            imp__box_add(value, s->channels, sums);
+        imp__box_add(value, s->channels, sums);
     }
     s->weights[k][pixel] = n;
     for (int c = 0; c < s->channels; c++) {

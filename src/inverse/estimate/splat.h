@@ -41,8 +41,9 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
 void imp__splat_destroy(imp_context *ctx, struct imp__splat *s);
 
 /* The same pictures, to the bit, where a pixel's samples are its own, from walks that are traced for
- * another end: they take n of one set and pixel at once, IMP_SPLAT_SET at most. Different pixels may be
- * taken at once. `end`: all are there. Ended by imp__splat_destroy. */
+ * another end: they take n of one set and pixel at once, IMP_SPLAT_SET at most. Walks that no
+ * picture can hold are dropped before. Different pixels may be taken at once. `end`: all are there.
+ * Ended by imp__splat_destroy. */
 #define IMP_SPLAT_SET 64 /* walks of a pass of a picture (film/film_picture.c) */
 enum imp_status imp__splat_begin(const struct imp_problem *p,
                                  const struct imp_tracer *tracer,
