@@ -135,6 +135,52 @@ static enum imp_status lit_check(const struct imp_scene *scene,
     return IMP_OK;
 }
 
+/* ---- Is light seen by any film? ------------------------------------------------------ */
+
+static bool is_seen(const struct imp_scene *scene, const struct imp_wavelengths *all,
+                    struct range light)
+{
+    for (int s = 0; s < scene->n_sensors; s++) {
+        const struct imp_wavelengths *w = &all[s * IMP_WAVES_DRAWN];
+        if (fmax(light.lo, w->lo) < fmin(light.hi, w->hi)) return true;
+    }
+    return false;
+}
+
+/* Warns of an object's spectra of light that are black in every picture, infrared ones beside an rgb
+ * film. */
+static void unseen_tell(const struct imp_scene *scene, const struct imp_wavelengths *all,
+                        const void *object, const struct imp_input_desc *desc,
+                        const struct imp_input *const *input, int n)
+{
+    const struct imp_node *node = imp__node_of(scene->root, object);
+    char where[512];
+    for (int j = 0; desc && node && j < n; j++) {
+        const struct imp_input *in = input[j];
+        if (desc[j].role != IMP_EMISSION || in->texture || !in->spectrum) continue;
+        const struct range r = range_of(in->spectrum);
+        if (is_seen(scene, all, r)) continue;
+        imp__warn(scene->ctx,
+                  "%s: %s: %g to %g nm are seen by no film of the scene: it is black",
+                  imp__loc_text(node->loc, where, sizeof where),
+                  in->param >= 0 ? scene->params[in->param].info.name : desc[j].name,
+                  r.lo, r.hi);
+    }
+}
+static void all_unseen_tell(const struct imp_scene *scene,
+                            const struct imp_wavelengths *all)
+{
+    for (int e = 0; e < scene->n_emitters; e++)
+        unseen_tell(scene, all, scene->emitters[e], scene->emitters[e]->ops->inputs,
+                    scene->emitters[e]->input, scene->emitters[e]->n_in);
+    for (int k = 0; k < scene->n_bsdfs; k++)
+        unseen_tell(scene, all, scene->bsdfs[k], scene->bsdfs[k]->ops->inputs,
+                    scene->bsdfs[k]->input, scene->bsdfs[k]->n_own);
+    for (int m = 0; m < scene->n_media; m++)
+        unseen_tell(scene, all, scene->media[m], scene->media[m]->ops->inputs,
+                    scene->media[m]->input, scene->media[m]->n_own);
+}
+
 enum imp_status imp__waves_build(struct imp_scene *scene)
 {
     enum imp_status st = IMP_OK;
@@ -178,6 +224,7 @@ enum imp_status imp__waves_build(struct imp_scene *scene)
         IMP_TRY(density_make(scene, film, &w));
         all[s * IMP_WAVES_DRAWN + IMP_WAVES_IMPORTANCE] = w;
     }
+    all_unseen_tell(scene, all);
     scene->wavelengths = all;
 out:
     return st;

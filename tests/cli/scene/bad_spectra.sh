@@ -66,3 +66,12 @@ importon info - <<<"<scene version='3.0.0'><emitter type='constant'/><shape type
 <bsdf type='diffuse' id='infrared'><spectrum name='reflectance' value='900:.1, 1700:.2'/></bsdf></shape>
 <shape type='sphere'><bsdf type='diffuse' id='percent'>
 <spectrum name='reflectance' value='400:20, 700:30'/></bsdf></shape></scene>" | grep reflectance
+# Infrared light beside an rgb film, and beside one that sees it.
+infrared() {
+    importon info -m spectral - <<<"<scene version='3.0.0'><sensor type='perspective'>$1</sensor>
+<shape type='sphere' id='coal'><emitter type='area'><spectrum name='radiance' value='900:1, 1000:2'/></emitter></shape>
+<emitter type='point' id='lamp'><spectrum name='intensity' value='840:1, 880:2'/></emitter>
+<emitter type='point' id='bulb'><spectrum name='intensity' value='800:1, 880:2'/></emitter></scene>" | grep emitters
+}
+infrared "<film type='hdrfilm'/>"
+infrared "<film type='specfilm'><spectrum name='a' value='700:1, 1000:1'/></film>"
