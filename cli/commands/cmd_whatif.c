@@ -9,6 +9,7 @@
 #include "shared/picture_files.h"
 #include "shared/problem_options.h"
 #include "shared/region.h"
+#include "shared/sensor_names.h"
 #include "shared/settings.h"
 #include "text/progress.h"
 
@@ -30,8 +31,8 @@ static const struct arg_option options[] = {
     {ARG_LIST, 0, "set", "ID=V[,V..]",
      "evaluate at other values; @FILE: many (--gradient lists them)", &cli.sets, 0, 0,
      NULL},
-    {ARG_INT, 's', "sensor", "N", "index of the sensor, from 0", &cli.sensor, 0, 1e6,
-     NULL},
+    {ARG_TEXT, 's', "sensor", "SENSOR", "its name, or its index from 0", &cli.sensor_text,
+     0, 0, NULL},
     {ARG_TEXT, 0, "region", "X0,Y0,X1,Y1",
      "mean over the pixels from X0 to before X1 and Y0 to before Y1 (default: all)",
      &o.region, 0, 0, NULL},
@@ -77,6 +78,7 @@ static int open_all(const char *path)
     const enum imp_status st = imp_walks_read(cli.context, NULL, path, &read, &w.walks);
     if (st != IMP_OK) return cli_fail(st, NULL);
     cli.scene = imp_walks_scene(w.walks);
+    if (cli.sensor_text) rc = sensor_set(cli.sensor_text);
     for (size_t i = 0; i < cli.sets.n && !rc; i++) rc = settings_apply(cli.sets.item[i]);
     if (!rc && o.region && problem_options.targets.n)
         rc = cli_error(EXIT_USAGE, "--region is of means; the pixels of a loss are "

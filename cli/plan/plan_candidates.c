@@ -17,10 +17,10 @@ static struct {
 } o;
 
 const struct arg_option options_candidates[] = {
-    {ARG_TEXT | ARG_REPLAYS, 0, "sensors", "N[,N..]",
+    {ARG_TEXT | ARG_REPLAYS, 0, "sensors", "SENSOR[,..]",
      "candidates: these sensors (default: all that --have does not name)", &o.sensors, 0,
      0, NULL},
-    {ARG_TEXT | ARG_REPLAYS, 0, "have", "N[,N..]",
+    {ARG_TEXT | ARG_REPLAYS, 0, "have", "SENSOR[,..]",
      "pictures of these sensors have been taken already", &o.have, 0, 0, NULL},
     {ARG_TEXT | ARG_REPLAYS, 0, "sphere", "X,Y,Z,R,N[,A,B]",
      "candidates: the camera of --sensor at N places, R from X,Y,Z, which it looks at, "
@@ -64,26 +64,29 @@ int numbers_read(const char *text, double *out, int most)
 
 enum { LIST_MAX = 4096 };
 
-/* Indices of sensors; *n of them. */
+/* Sensors by name or number, separated by commas; *n of them. */
 static int sensors_read(const char *option, const char *text, int *out, int *n)
 {
-    double *v = cli_alloc(LIST_MAX, sizeof *v);
+    char *list = cli_strdup(text), *rest = list, names[256];
     int rc = 0;
-    *n = numbers_read(text, v, LIST_MAX);
-    if (*n < 0)
-        rc = cli_error(EXIT_USAGE, "--%s %s: expected indices of sensors, such as 0,2",
-                       option, text);
-    for (int k = 0; k < *n && !rc; k++) {
-        out[k] = (int)v[k];
-        if (v[k] != floor(v[k]) || v[k] < 0 || v[k] >= sensor_count())
-            rc = cli_error(EXIT_USAGE, "--%s %s: there is no sensor %g; the scene has %d",
-                           option, text, v[k], sensor_count());
-        for (int i = 0; i < k && !rc; i++)
-            if (out[i] == out[k])
-                rc = cli_error(EXIT_USAGE, "--%s %s: sensor %d is there twice", option,
-                               text, out[k]);
+    *n = 0;
+    for (char *item; !rc && (item = strsep(&rest, ",")) != NULL;) {
+        const int found = sensor_find(item);
+        if (found < 0) {
+            sensor_names(names, sizeof names);
+            rc = cli_error(EXIT_USAGE,
+                           "--%s %s: there is no sensor '%s'; the scene has: %s", option,
+                           text, item, names);
+        } else if (*n == LIST_MAX) {
+            rc = cli_error(EXIT_USAGE, "--%s: more than %d sensors", option, LIST_MAX);
+        }
+        for (int i = 0; i < *n && !rc; i++)
+            if (out[i] == found)
+                rc = cli_error(EXIT_USAGE, "--%s %s: sensor '%s' is there twice", option,
+                               text, item);
+        if (!rc) out[(*n)++] = found;
     }
-    free(v);
+    free(list);
     return rc;
 }
 

@@ -9,3 +9,5 @@ plan --sensors 1 --of 'two.radiance.value'
 plan --sphere 10,0,0,2,3,80,90 --up 0,0,1 --budget 2
 printf '# places\n0 0 2 0 0 0 at one\n10 0 2 10 0 0\n' >places
 plan --path places --json | sed 's/,"/,\n"/g; s/\([0-9]\.[0-9]\{5\}\)[0-9]*/\1/g' | grep -v '"importon"\|spp\|seed'
+echo "- sensors by name"
+plan --sensors 0,1 >numbers; plan --sensors first,second >names; cmp numbers names && echo the same

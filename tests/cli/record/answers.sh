@@ -19,6 +19,9 @@ paste <(number loss.json value | cut -d: -f2; numbers loss.json) <(number kept_l
     awk '{ d = $1 - $2; s = $1 * 1e-9; if (d * d > s * s) bad++ } END { if (NR > 20 && !bad) print "loss and gradient: equal to 1e-9" }'
 importon what-if room.walks -o kept.exr -q --no-preview >answer && importon compare kept.exr traced.exr | grep max
 grep -c 'effective sample size 1$' answer
+echo "- a sensor by name"
+importon what-if room.walks --sensor camera --json >named.json; [[ $(number named.json value) == "$(number kept.json value)" ]] && echo mean: equal
+importon what-if room.walks --sensor nowhere; echo "exit $?"
 echo "- elsewhere"
 importon what-if room.walks --sweep 'white.reflectance.value=0.2:0.8:4' | awk '{ print NF, $4 }'
 importon what-if room.walks --region 0,0,4,16 --set red.reflectance.value=0,0,0 | grep -c 'mean of the region'
