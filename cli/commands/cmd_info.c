@@ -139,6 +139,7 @@ static void print_luminaires(struct json *j)
         if (j) {
             json_object(j, NULL);
             json_text(j, "name", l.name);
+            if (l.file) json_text(j, "file", l.file);
             json_number(j, "flux", l.flux);
             if (l.lamp_flux > 0) json_number(j, "lamp_flux", l.lamp_flux);
             if (l.watts > 0) json_number(j, "watts", l.watts);

@@ -159,10 +159,28 @@ static void grid_put(FILE *f, const struct grid *g)
 
 /* ---- Luminaires --------------------------------------------------------------------------------- */
 
+/* "": it has none. */
+static const char *file_of(const struct room_page *p, const struct imp_luminaire_info *l)
+{
+    const char *chosen = p->file_of ? p->file_of(l->name, p->payload) : "";
+    return *chosen ? chosen : l->file ? l->file : "";
+}
+
+static int any_file(const struct room_page *p)
+{
+    int any = p->file_of != NULL;
+    for (int i = 0; !any && i < imp_scene_n_luminaires(cli.scene); i++) {
+        struct imp_luminaire_info l = {.size = sizeof l};
+        any = imp_scene_get_luminaire(cli.scene, i, &l) == IMP_OK && l.file;
+    }
+    return any;
+}
+
 static void luminaires_put(FILE *f, const struct room_page *p)
 {
     const int n = imp_scene_n_luminaires(cli.scene);
     double watts = 0, flux = 0;
+    const int files = any_file(p);
     int all_watts = 1, rows = 0;
     if (n == 0) return;
     fprintf(f,
@@ -170,7 +188,7 @@ static void luminaires_put(FILE *f, const struct room_page *p)
             "class=\"scroll\"><table>\n<thead><tr><th>Name"
             "</th>%s<th>position</th><th>dimmed "
             "to</th><th>maintenance</th><th>flux</th><th>power</th></tr></thead>\n",
-            p->file_of ? "<th>file</th>" : "");
+            files ? "<th>file</th>" : "");
     for (int i = 0; i < n; i++) {
         struct imp_luminaire_info l = {.size = sizeof l};
         if (imp_scene_get_luminaire(cli.scene, i, &l) != IMP_OK) continue;
@@ -181,9 +199,9 @@ static void luminaires_put(FILE *f, const struct room_page *p)
         rows++;
         fprintf(f, "<tr><td>");
         text_put(f, l.name);
-        if (p->file_of) {
+        if (files) {
             fprintf(f, "</td><td>");
-            text_put(f, p->file_of(l.name, p->payload));
+            text_put(f, file_of(p, &l));
         }
         fprintf(f,
                 "</td><td>%.4g, %.4g, %.4g</td><td>%.3g %%</td><td>%.3g</td><td>%.5g "
@@ -197,7 +215,7 @@ static void luminaires_put(FILE *f, const struct room_page *p)
         flux += l.flux;
     }
     fprintf(f, "<tr><td>%d in all</td>%s<td></td><td></td><td></td><td>%.5g lm</td><td>",
-            rows, p->file_of ? "<td></td>" : "", flux);
+            rows, files ? "<td></td>" : "", flux);
     if (all_watts) fprintf(f, "%.4g W", watts);
     fprintf(f, "</td></tr>\n</table></div>\n<p class=\"faint\">Flux in operation: with "
                "dimming and "

@@ -15,7 +15,8 @@ struct room_page {
     size_t n_wants;
     struct grid grid[PAGE_GRIDS]; /* it owns them */
     size_t n_grids;
-    /* For a design: what the file says of each emitter, by name; NULL: of `read`. */
+    /* For a design: what the answer says of each emitter, by name; NULL: of `read`, what the
+     * scene says. */
     const char *(*file_of)(const char *lamp, void *payload);
     double (*level_of)(const char *lamp, void *payload); /* 0: it is not there */
     double (*watts_of)(const char *lamp, void *payload); /* 0: by the file */

@@ -364,6 +364,9 @@ struct imp_luminaire_info {
                               a round one as the square of its area */
     double level; /**< dimming times the present scale (1 for a texture): 0 is off */
     double power; /**< W in operation: watts times level; 0: watts are not given */
+    const char
+        *file; /**< its photometric file as the scene names it; NULL: of none. Belongs
+                           to the scene */
 };
 
 /** Number of luminaires; 0 for NULL. */

@@ -79,6 +79,8 @@ class Luminaire(NamedTuple):
     opening: tuple[float, float, float]
     level: float
     power: float
+    file: str
+    """As the scene names it; "": of none."""
 
 
 def call(scene: Scene, params: Any, options: Any, progress: Any, *call: Any) -> None:
@@ -208,7 +210,7 @@ def luminaires(scene: Scene) -> list[Luminaire]:
         x = make(_c.imp_luminaire_info)
         scene._context.check(lib.imp_scene_get_luminaire(scene.pointer, i, ctypes.byref(x)))
         found.append(Luminaire(decode(x.name), x.flux, x.lamp_flux, x.watts, x.efficacy, x.dimming, x.maintenance,
-                               bool(x.is_point), tuple(x.position), tuple(x.opening), x.level, x.power))
+                               bool(x.is_point), tuple(x.position), tuple(x.opening), x.level, x.power, decode(x.file)))
     return found
 
 

@@ -58,7 +58,8 @@ enum imp_status imp_scene_get_luminaire(const imp_scene *scene, int luminaire,
                                      .dimming = x->dimming,
                                      .maintenance = x->maintenance,
                                      .is_point = !e->shape,
-                                     .level = x->dimming * scale};
+                                     .level = x->dimming * scale,
+                                     .file = x->file};
     /* A scale stands for a dimmer that is set later, so power follows it as it follows dimming;
      * age and dirt (maintenance) save nothing. */
     all.power = all.watts * all.level;

@@ -112,6 +112,8 @@ static enum imp_status common_build(const struct imp_build *b, struct imp__ies *
     int unit;
     if (!b->node->ies) IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "has no table"));
     x->data = b->node->ies;
+    const struct imp_prop *file = imp__node_prop(b->node, "filename");
+    x->file = file ? file->string : NULL;
     IMP_TRY(imp_build_choice(b, "units", units, 2, 0, &unit));
     x->lumens = unit == 0 ? 1 : PER_WATT;
     x->factor = 1 / x->lumens;

@@ -19,6 +19,7 @@ struct imp__ies {
     imp_v3 nadir, c0,
         c90; /* orthonormal, world: w = nadir cos v + sin v (c0 cos h + ...) */
     const struct imp_ies_data *data;
+    const char *file; /* that the scene names; NULL: the table came without one */
     double
         factor; /* emitted intensity over the table's: 1 or 1/683, times flux, dimming and
                         maintenance */
