@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * For tests of derivatives in closed form: gradients of the mean of a picture. */
+ * For tests of derivatives in closed form: gradients of the mean of a picture, and scenes of media. */
 #ifndef IMP_TEST_MEAN_GRADIENT_H
 #define IMP_TEST_MEAN_GRADIENT_H
 
 #include "imp_scene.h"
 #include "imp_tap.h"
+
+#define VOLPATH(DEPTH)                                                                   \
+    "<integrator type='volpath'><integer name='max_depth' value='" DEPTH                 \
+    "'/></integrator>"
 
 enum { MEAN_NUMBERS_MAX = 16, MEAN_VALUES_MAX = 1024 * 3 };
 
@@ -35,6 +39,23 @@ static inline void mean_gradient(imp_context *ctx, imp_scene *scene, const char 
         for (size_t k = 0; k < numbers; k++) tap_add(&out[k], g[k]);
     }
     imp_problem_destroy(p);
+}
+
+/* One number of `name`, a parameter by what moves, in a scene of these objects: within `most` of ref. */
+static inline void mean_gradient_test(imp_context *ctx, const char *what,
+                                      const char *objects, const char *name, int number,
+                                      int spp, double ref, double most)
+{
+    char xml[4096];
+    struct tap_stat g[MEAN_NUMBERS_MAX] = {{0, 0, 0}};
+    if (snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", objects) >=
+        (int)sizeof xml)
+        exit(99);
+    imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
+    test_must(ctx, imp_scene_add_geometry(scene, name));
+    mean_gradient(ctx, scene, name, spp, 16, g);
+    tap_z(&g[number], ref, most, what);
+    imp_scene_destroy(scene);
 }
 
 #endif

@@ -200,4 +200,20 @@ static inline void room_poses_set(imp_context *ctx, imp_scene *scene,
     }
 }
 
+/* Parallel rays along -z on a film of 4 x 4, before a sky of radiance 5: pictures of black things are
+ * areas. */
+static inline imp_scene *before_sky_build(imp_context *ctx, const char *objects)
+{
+    char xml[4096];
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='direct'/>"
+             "<sensor type='orthographic'><transform name='to_world'><scale value='2'/>"
+             "<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film "
+             "type='hdrfilm'><integer name='width' value='16'/><integer name='height' "
+             "value='16'/><rfilter type='box'/></film></sensor><emitter type='constant'>"
+             "<rgb name='radiance' value='5'/></emitter>%s</scene>",
+             objects);
+    return test_scene_text(ctx, xml, IMP_MONO);
+}
+
 #endif

@@ -4,6 +4,7 @@
  * reading is the same number from either end, R = R_A (Veach 1997, 3.7; Morley et al.
  * 2006, section 1). No factor stands between them but those of the scattering functions;
  * each of these, left out of a walk, must be missed (planted). */
+#include "end_reading.h"
 #include "imp_light_room.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
@@ -36,21 +37,6 @@ static imp_scene *scene_of(int max_depth, const char *body, enum imp_color_mode 
     return test_scene_text(ctx, xml, mode);
 }
 
-static struct imp_estimate reading(imp_scene *scene, enum imp_from from, int spp,
-                                   uint64_t seed)
-{
-    struct imp_run run = IMP_RUN_INIT;
-    struct imp_estimate e;
-    imp_problem *p;
-    run.from = from;
-    run.spp = spp;
-    run.seed = seed;
-    test_must(ctx, imp_problem_create(scene, &p));
-    test_must(ctx, imp_problem_functional(p, NULL, &run, &e, NULL, NULL));
-    imp_problem_destroy(p);
-    return e;
-}
-
 /* Both ends, and the truth if it is known (not NAN). relative: largest standard error.
  * The reading from the sensor. */
 static double ends(const char *what, int max_depth, const char *body,
@@ -58,8 +44,10 @@ static double ends(const char *what, int max_depth, const char *body,
                    double truth, double relative)
 {
     imp_scene *scene = scene_of(max_depth, body, mode);
-    const struct imp_estimate a = reading(scene, IMP_FROM_SENSOR, from_sensor, 11);
-    const struct imp_estimate b = reading(scene, IMP_FROM_LIGHTS, from_lights, 12);
+    const struct imp_estimate a =
+        end_reading(ctx, scene, IMP_FROM_SENSOR, from_sensor, 11);
+    const struct imp_estimate b =
+        end_reading(ctx, scene, IMP_FROM_LIGHTS, from_lights, 12);
     const double se = hypot(a.se, b.se), z = (a.value - b.value) / se;
     tap_ok(fabs(z) < 4 && se < relative * fabs(a.value),
            "%s: sensor %.6g +- %.1g, lights %.6g +- %.1g # z %.2f", what, a.value, a.se,
@@ -291,7 +279,7 @@ static void kernels(void)
              "<bsdf type='stam_m2'><string name='variant' value='paper'/></bsdf>");
     ends("M2, not reciprocal", 3, body, IMP_MONO, 20000, 20000, NAN, 1e-2);
     imp_scene *scene = scene_of(3, body, IMP_MONO);
-    const struct imp_estimate right = reading(scene, IMP_FROM_SENSOR, 20000, 5);
+    const struct imp_estimate right = end_reading(ctx, scene, IMP_FROM_SENSOR, 20000, 5);
     caught("M2 with its sides exchanged", scene, IMP_FROM_LIGHTS, 200000,
            connection_sides, right.value, NAN);
     imp_scene_destroy(scene);
@@ -351,8 +339,8 @@ static void shading_normals(void)
     imp_scene_end(scene);
     imp_scene_end(scene);
     test_must(ctx, imp_scene_commit(scene));
-    const struct imp_estimate a = reading(scene, IMP_FROM_SENSOR, 20000, 3);
-    const struct imp_estimate b = reading(scene, IMP_FROM_LIGHTS, 40000, 4);
+    const struct imp_estimate a = end_reading(ctx, scene, IMP_FROM_SENSOR, 20000, 3);
+    const struct imp_estimate b = end_reading(ctx, scene, IMP_FROM_LIGHTS, 40000, 4);
     const double z = (a.value - b.value) / hypot(a.se, b.se);
     tap_ok(fabs(z) < 4 && hypot(a.se, b.se) < 1e-2 * a.value,
            "shading normals: sensor %.6g +- %.1g, lights %.6g +- %.1g # z %.2f", a.value,

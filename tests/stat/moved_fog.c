@@ -7,9 +7,6 @@
 #include "moves_kit.h"
 #include "moves_numbers.h"
 
-#define VOLPATH(DEPTH)                                                                   \
-    "<integrator type='volpath'><integer name='max_depth' value='" DEPTH                 \
-    "'/></integrator>"
 #define FOG(SIGMA, ALBEDO, PHASE)                                                        \
     "<medium type='homogeneous' id='fog'><rgb name='sigma_t' value='" SIGMA              \
     "'/><rgb name='albedo' value='" ALBEDO "'/>" PHASE "</medium>"
@@ -88,17 +85,10 @@ static double disk_seen(double D, double sigma, double albedo)
     return straight + albedo * sigma * scattered;
 }
 
-static void mean_test(const char *what, const char *rest, const char *name, int number,
+static void mean_test(const char *what, const char *objects, const char *name, int number,
                       int spp, double ref, double tolerance)
 {
-    char xml[4096];
-    struct tap_stat g[6] = {{0, 0, 0}};
-    snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", rest);
-    imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
-    test_must(ctx, imp_scene_add_geometry(scene, name));
-    mean_gradient(ctx, scene, name, spp, 16, g);
-    tap_z(&g[number], ref, tolerance * fabs(ref), what);
-    imp_scene_destroy(scene);
+    mean_gradient_test(ctx, what, objects, name, number, spp, ref, tolerance * fabs(ref));
 }
 
 static void closed_test(int more)

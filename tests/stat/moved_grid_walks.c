@@ -16,9 +16,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#define VOLPATH(DEPTH)                                                                   \
-    "<integrator type='volpath'><integer name='max_depth' value='" DEPTH                 \
-    "'/></integrator>"
 #define FILM                                                                             \
     "<film type='hdrfilm'><integer name='width' value='8'/><integer name='height' "      \
     "value='8'/><rfilter type='box'/></film>"

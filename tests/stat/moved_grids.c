@@ -8,9 +8,6 @@
 #include "moves_numbers.h"
 #include "vol_write.h"
 
-#define VOLPATH(DEPTH)                                                                   \
-    "<integrator type='volpath'><integer name='max_depth' value='" DEPTH                 \
-    "'/></integrator>"
 #define GRID(NAME, ID, FILE, TO_WORLD)                                                   \
     "<volume type='gridvolume' name='" NAME "' id='" ID                                  \
     "'><string name='filename' value='%s'/>" FILE "<transform name='to_world'>" TO_WORLD \
@@ -69,18 +66,12 @@ static void files_make(void)
     "<translate z='" Z "'/></transform><emitter type='area'><rgb name='radiance' "       \
     "value='3'/></emitter></shape>"
 
-static void mean_test(const char *what, const char *rest, const char *name, int number,
+static void mean_test(const char *what, const char *objects, const char *name, int number,
                       int spp, double ref, double most)
 {
-    char xml[4096], filled[4096];
-    struct tap_stat g[12] = {{0, 0, 0}};
-    snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", rest);
-    snprintf(filled, sizeof filled, xml, slab_file);
-    imp_scene *scene = test_scene_text(ctx, filled, IMP_MONO);
-    test_must(ctx, imp_scene_add_geometry(scene, name));
-    mean_gradient(ctx, scene, name, spp, 16, g);
-    tap_z(&g[number], ref, most, what);
-    imp_scene_destroy(scene);
+    char filled[4096];
+    snprintf(filled, sizeof filled, objects, slab_file);
+    mean_gradient_test(ctx, what, filled, name, number, spp, ref, most);
 }
 
 static void closed_test(int more)

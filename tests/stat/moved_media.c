@@ -7,9 +7,6 @@
 #include "moves_kit.h"
 #include "moves_numbers.h"
 
-#define VOLPATH(DEPTH)                                                                   \
-    "<integrator type='volpath'><integer name='max_depth' value='" DEPTH                 \
-    "'/></integrator>"
 #define MEDIUM(SIGMA, ALBEDO, PHASE)                                                     \
     "<medium type='homogeneous' name='interior'><rgb name='sigma_t' value='" SIGMA       \
     "'/><rgb name='albedo' value='" ALBEDO "'/>" PHASE "</medium>"
@@ -58,19 +55,6 @@ static double ball_seen(double D, double r, double sigma)
     "<shape type='cube' id='fog'><transform name='to_world'><scale x='1.5' y='1.5' "     \
     "z='.7'/></transform><bsdf type='null'/>" MEDIUM(".8", ".75", "") "</shape>"
 
-static void mean_test(const char *what, const char *rest, const char *name, int number,
-                      int spp, double ref, double most)
-{
-    char xml[4096];
-    struct tap_stat g[12] = {{0, 0, 0}};
-    snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", rest);
-    imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
-    test_must(ctx, imp_scene_add_geometry(scene, name));
-    mean_gradient(ctx, scene, name, spp, 16, g);
-    tap_z(&g[number], ref, most, what);
-    imp_scene_destroy(scene);
-}
-
 static void closed_test(int more)
 {
     static const char ball[] =
@@ -82,14 +66,15 @@ static void closed_test(int more)
                  nearer = (ball_seen(3 - h, 1, 1.2) - ball_seen(3 + h, 1, 1.2)) / (2 * h),
                  by_depth = .75 * sigma / (4 * IMP_PI) * 5 * exp(-2 * sigma * thick);
     const int spp = 64 * more;
-    mean_test("a ball that absorbs becomes larger", ball, "fog.radius", 0, spp, by_radius,
-              .005);
-    mean_test("it comes nearer", ball, "fog.pose", 2, spp, nearer, .005);
-    mean_test("the camera comes nearer", ball, "camera.pose", 2, spp, -nearer, .005);
-    mean_test("a slab that scatters becomes thicker", slab, "fog.scale", 0, 4 * spp,
-              by_depth * thick, .025 * by_depth * thick);
-    mean_test("it is farther away", slab, "fog.pose", 2, 8 * spp, 0,
-              .025 * by_depth * thick);
+    mean_gradient_test(ctx, "a ball that absorbs becomes larger", ball, "fog.radius", 0,
+                       spp, by_radius, .005);
+    mean_gradient_test(ctx, "it comes nearer", ball, "fog.pose", 2, spp, nearer, .005);
+    mean_gradient_test(ctx, "the camera comes nearer", ball, "camera.pose", 2, spp,
+                       -nearer, .005);
+    mean_gradient_test(ctx, "a slab that scatters becomes thicker", slab, "fog.scale", 0,
+                       4 * spp, by_depth * thick, .025 * by_depth * thick);
+    mean_gradient_test(ctx, "it is farther away", slab, "fog.pose", 2, 8 * spp, 0,
+                       .025 * by_depth * thick);
 }
 
 /* The room of moves_kit.h; with its camera in medium 'a'. */

@@ -28,17 +28,11 @@ static imp_scene *room(const char *rest)
  * pi r^2 of it, or 2 r l. */
 static imp_scene *before_sky(const char *shape)
 {
-    char xml[2048];
-    snprintf(xml, sizeof xml,
-             "<scene version='3.0.0'>" DIRECT
-             "<sensor type='orthographic'><transform name='to_world'><scale value='2'/>"
-             "<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film "
-             "type='hdrfilm'><integer name='width' value='16'/><integer name='height' "
-             "value='16'/><rfilter type='box'/></film></sensor><emitter type='constant'>"
-             "<rgb name='radiance' value='5'/></emitter>%s<bsdf type='diffuse'><rgb "
-             "name='reflectance' value='0'/></bsdf></shape></scene>",
+    char black[2048];
+    snprintf(black, sizeof black,
+             "%s<bsdf type='diffuse'><rgb name='reflectance' value='0'/></bsdf></shape>",
              shape);
-    return test_scene_text(ctx, xml, IMP_MONO);
+    return before_sky_build(ctx, black);
 }
 
 static void areas_test(void)

@@ -48,19 +48,7 @@ static imp_scene *with_file(imp_scene *(*make)(const char *), const char *shape,
     "value='moved_strands.txt'/>" MORE "</shape>"
 #define BLACK "<bsdf type='diffuse'><rgb name='reflectance' value='0'/></bsdf>"
 
-static imp_scene *before_sky(const char *shape)
-{
-    char xml[2048];
-    snprintf(xml, sizeof xml,
-             "<scene version='3.0.0'>" DIRECT
-             "<sensor type='orthographic'><transform name='to_world'><scale value='2'/>"
-             "<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film "
-             "type='hdrfilm'><integer name='width' value='16'/><integer name='height' "
-             "value='16'/><rfilter type='box'/></film></sensor><emitter type='constant'>"
-             "<rgb name='radiance' value='5'/></emitter>%s</scene>",
-             shape);
-    return test_scene_text(ctx, xml, IMP_MONO);
-}
+static imp_scene *before_sky(const char *shape) { return before_sky_build(ctx, shape); }
 
 /* ---- The area of a picture by quadrature ---------------------------------------------- */
 

@@ -10,9 +10,6 @@
 #include "moves_numbers.h"
 #include "vol_write.h"
 
-#define VOLPATH(DEPTH)                                                                   \
-    "<integrator type='volpath'><integer name='max_depth' value='" DEPTH                 \
-    "'/></integrator>"
 #define GRID(NAME, ID, TO_WORLD)                                                         \
     "<volume type='gridvolume' name='" NAME "' id='" ID                                  \
     "'><string name='filename' value='%s'/><transform name='to_world'>" TO_WORLD         \
@@ -125,19 +122,6 @@ static double sun_seen(double cosine, const void *payload)
     return .75 * 5 / (4 * IMP_PI) * (1 - exp(-p[0] * m)) / (m * cosine);
 }
 
-static void mean_test(const char *what, const char *rest, const char *name, int number,
-                      int spp, double ref, double most)
-{
-    char xml[4096];
-    struct tap_stat g[12] = {{0, 0, 0}};
-    snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", rest);
-    imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
-    test_must(ctx, imp_scene_add_geometry(scene, name));
-    mean_gradient(ctx, scene, name, spp, 16, g);
-    tap_z(&g[number], ref, most, what);
-    imp_scene_destroy(scene);
-}
-
 static void closed_test(int more)
 {
     enum { INSIDE, ABOVE, SUNNY, ENDS, CUT };
@@ -166,51 +150,51 @@ static void closed_test(int more)
     const double *p = &depth;
     for (int k = 0; k < 2; k++) by[k] = film_mean(TILT + (k ? -h : h), wall_seen, p);
     const double by_tilt = (by[0] - by[1]) / (2 * h);
-    mean_test("a camera in layers turns", xml[INSIDE], "camera.pose", 3, spp, by_tilt,
-              .02 * fabs(by_tilt));
+    mean_gradient_test(ctx, "a camera in layers turns", xml[INSIDE], "camera.pose", 3,
+                       spp, by_tilt, .02 * fabs(by_tilt));
     for (int k = 0; k < 2; k++) {
         moved = depth + (k ? -h : h);
         by[k] = film_mean(TILT, wall_seen, &moved);
     }
     const double slope = (by[0] - by[1]) / (2 * h); /* by the depth of the column */
-    mean_test("it rises", xml[INSIDE], "camera.pose", 2, spp, slope * density(at),
-              .02 * fabs(slope * density(at)));
-    mean_test("the wall behind them rises", xml[INSIDE], "wall.pose", 2, spp,
-              -slope * density(wall), .02 * fabs(slope * density(wall)));
+    mean_gradient_test(ctx, "it rises", xml[INSIDE], "camera.pose", 2, spp,
+                       slope * density(at), .02 * fabs(slope * density(at)));
+    mean_gradient_test(ctx, "the wall behind them rises", xml[INSIDE], "wall.pose", 2,
+                       spp, -slope * density(wall), .02 * fabs(slope * density(wall)));
     depth = column(wall, 1);
     for (int k = 0; k < 2; k++) by[k] = film_mean(TILT + (k ? -h : h), wall_seen, p);
     const double above = (by[0] - by[1]) / (2 * h);
-    mean_test("a camera above layers turns", xml[ABOVE], "camera.pose", 3, spp, above,
-              .02 * fabs(above));
+    mean_gradient_test(ctx, "a camera above layers turns", xml[ABOVE], "camera.pose", 3,
+                       spp, above, .02 * fabs(above));
 
     depth = column(-.6, .6);
     for (int k = 0; k < 2; k++) by[k] = film_mean(TILT + (k ? -h : h), wall_seen, p);
     const double cut = (by[0] - by[1]) / (2 * h);
-    mean_test("it turns above layers that end at a border", xml[ENDS], "camera.pose", 3,
-              8 * spp, cut, .04 * fabs(cut));
+    mean_gradient_test(ctx, "it turns above layers that end at a border", xml[ENDS],
+                       "camera.pose", 3, 8 * spp, cut, .04 * fabs(cut));
     depth = column(-.7, .2);
     for (int k = 0; k < 2; k++) {
         moved = depth + (k ? -h : h);
         by[k] = film_mean(TILT, wall_seen, &moved);
     }
     const double rises = (by[0] - by[1]) / (2 * h) * (density(.2) - density(-.7));
-    mean_test("the border rises", xml[CUT], "box.pose", 2, 4 * spp, rises,
-              .04 * fabs(rises));
+    mean_gradient_test(ctx, "the border rises", xml[CUT], "box.pose", 2, 4 * spp, rises,
+                       .04 * fabs(rises));
 
     double sun[2] = {column(-1, 1), SUN_COSINE};
     for (int k = 0; k < 2; k++) by[k] = film_mean(TILT + (k ? -h : h), sun_seen, sun);
     const double sunny = (by[0] - by[1]) / (2 * h);
     if (more > 1)
-        mean_test("above layers in a sun it turns", xml[SUNNY], "camera.pose", 3, 4 * spp,
-                  sunny, .04 * fabs(sunny));
+        mean_gradient_test(ctx, "above layers in a sun it turns", xml[SUNNY],
+                           "camera.pose", 3, 4 * spp, sunny, .04 * fabs(sunny));
     for (int k = 0; k < 2; k++) {
         const double y = .3 + (k ? -h : h);
         sun[1] = 1 / sqrt(1 + y * y);
         by[k] = film_mean(TILT, sun_seen, sun);
     }
     const double turned = (by[0] - by[1]) / (2 * h * SUN_COSINE); /* of a unit vector */
-    mean_test("the sun turns", xml[SUNNY], "sun.direction", 1, spp, turned,
-              .02 * fabs(turned));
+    mean_gradient_test(ctx, "the sun turns", xml[SUNNY], "sun.direction", 1, spp, turned,
+                       .02 * fabs(turned));
 }
 
 /* ---- In a room ------------------------------------------------------------------------- */

@@ -4,6 +4,7 @@
  * shutter is open, lights and sensors that vary in time, from both ends; and random
  * numbers of their own for each (Morley et al. 2006; F13 of the checklist in
  * docs/adjoint-photons.md). */
+#include "end_reading.h"
 #include "imp_light_room.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
@@ -102,27 +103,12 @@ static void bar(void)
 
 /* ---- Lights and sensors that vary ----------------------------------------------------- */
 
-static struct imp_estimate reading(imp_scene *scene, enum imp_from from, int spp,
-                                   uint64_t seed)
-{
-    struct imp_run run = IMP_RUN_INIT;
-    struct imp_estimate e;
-    imp_problem *p;
-    run.from = from;
-    run.spp = spp;
-    run.seed = seed;
-    test_must(ctx, imp_problem_create(scene, &p));
-    test_must(ctx, imp_problem_functional(p, NULL, &run, &e, NULL, NULL));
-    imp_problem_destroy(p);
-    return e;
-}
-
 /* Both ends against the truth; NAN: against each other. */
 static void ends(const char *what, const char *xml, int spp, double truth, double limit)
 {
     imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
-    const struct imp_estimate a = reading(scene, IMP_FROM_SENSOR, spp, 5),
-                              b = reading(scene, IMP_FROM_LIGHTS, spp, 6);
+    const struct imp_estimate a = end_reading(ctx, scene, IMP_FROM_SENSOR, spp, 5),
+                              b = end_reading(ctx, scene, IMP_FROM_LIGHTS, spp, 6);
     const double se = hypot(a.se, b.se), z = (a.value - b.value) / se;
     tap_ok(fabs(z) < 4 && se < limit * a.value,
            "%s: sensor %.5g +- %.1g, lights %.5g +- %.1g # z %.2f", what, a.value, a.se,
