@@ -265,7 +265,7 @@ static void zenith(int spp)
     }
     double mean[3], se[3];
     struct imp_run run = IMP_RUN_INIT;
-    run.spp = 64;
+    run.spp = 8;
     imp_scene *s = test_scene(ctx, "sky.xml", IMP_SPECTRAL,
                               "width=8 height=8 tilt=90 fov=20 albedo=0");
     media_mean_run(ctx, s, &run, mean, se, IMP_DROP_NONE);
