@@ -110,7 +110,8 @@ static int run_read(int n, char **operand)
     imp_problem *problem = NULL;
     struct findings found = {.ends = o.ends};
     (void)n;
-    cli.brief = !o.ends && !o.shares && !year_wanted.weather;
+    cli.brief = !o.ends && !o.shares && !year_wanted.weather && !ratings_wanted.ugr &&
+                !ratings_wanted.dgp;
     int rc = cli_load(operand[0]);
     if (rc) return rc;
     struct imp_run run = cli_run();

@@ -256,7 +256,9 @@ int cli_load(const char *path)
     options.luminaires = cli.luminaires.item;
     options.n_luminaires = cli.luminaires.n;
     options.weights = cli.weights;
-    if (cli.brief) options.spp = cli.spp;
+    /* A guide has rays of its own. */
+    if (cli.brief && !cli.guide && cli.guide_share <= 0 && cli.guide_roulette <= 0)
+        options.spp = cli.spp;
     options.bins = cli.bins;
     options.lenient = (enum imp_lenience)cli.lenient;
     char *folders = cli.search ? split_search(cli.search, &search) : NULL;

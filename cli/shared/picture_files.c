@@ -172,11 +172,16 @@ static int write_to_stdout(const imp_film *film, const struct imp_write_options 
     return cli_error(EXIT_RUN, "standard output: %s", strerror(code));
 }
 
-/* Gives back what was freed in making the picture, or its file: the next file takes memory of its own. */
-static void memory_return(void)
+/* Gives back what was freed in making a large picture, or its file: the next file takes memory of its
+ * own. Of small ones, which fits write many of, the next step has the pages. */
+static void memory_return(const imp_film *film)
 {
 #ifdef __GLIBC__
-    malloc_trim(0);
+    struct imp_film_info info = {.size = sizeof info};
+    imp_film_get_info(film, &info);
+    if ((int64_t)info.width * info.height * info.channels > 1 << 18) malloc_trim(0);
+#else
+    (void)film;
 #endif
 }
 
@@ -184,7 +189,7 @@ int picture_write(const imp_film *film, const char *path, const struct picture_o
 {
     struct imp_write_options options = IMP_WRITE_OPTIONS_INIT;
     if (cli.verifies) return 0;
-    memory_return();
+    memory_return(film);
     options.half = o->half;
     options.standard_error = o->standard_error;
     options.exposure = o->exposure;
@@ -196,7 +201,7 @@ int picture_write(const imp_film *film, const char *path, const struct picture_o
     enum imp_status st = imp_film_write(film, path, &options);
     char *preview = o->no_preview ? NULL : preview_path(path);
     if (st == IMP_OK) manifest_wrote(path);
-    memory_return();
+    memory_return(film);
     if (st == IMP_OK && preview) st = imp_film_write(film, preview, &options);
     if (st == IMP_OK && preview) manifest_wrote(preview);
     free(preview);

@@ -401,8 +401,8 @@ struct imp_load_options {
     size_t n_luminaires;
     /** Samples a pixel that all runs of this scene will take, about; 0: not known. Where a scene has
      * many more triangles than it will have walks, the tree over them is made in a third of the time,
-     * and asked a little slower. Hits are the same to the bit, except of facets that lie in each other,
-     * of which either may be met. */
+     * and asked a little slower. Hits are the same to the bit, except of facets that lie in each other
+     * or share the edge that a ray hits, of which either may be met. */
     int64_t spp;
 };
 #define IMP_LOAD_OPTIONS_INIT IMP_INIT_ZERO(struct imp_load_options)

@@ -76,7 +76,8 @@ IMP_COLD void imp__warn(imp_context *ctx, const char *format, ...) IMP_PRINTF(2,
 void *imp__alloc(imp_context *ctx, size_t n, size_t size);
 void *imp__alloc_raw(imp_context *ctx, size_t n, size_t size); /* not zeroed */
 void imp__release(imp_context *ctx, void *memory);
-/* The same, of which `bytes` from the beginning are kept, and the rest is given back if it can be. */
+/* The same, of which `bytes` from the beginning are kept, and the rest is given back if it can be;
+ * aligned as malloc does it. bytes > 0. */
 void *imp__shrunk(imp_context *ctx, void *memory, size_t bytes);
 /* IMP_E_NOMEM, with both sizes, if so many bytes are more than the machine has left. Not
  * checked with a host's own allocator, which has its own limits. `what` begins the message. */
