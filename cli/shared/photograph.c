@@ -86,8 +86,9 @@ static struct encoding encoding_of(const char *spec)
     for (size_t k = 0; k < sizeof linear / sizeof *linear; k++)
         if (!memcmp(header, linear[k], strlen(linear[k]))) e.srgb = false;
     if (!memcmp(header, "\x93NUMPY", 6)) { /* of whole numbers by its dictionary's type */
-        const bool words = strstr(header + 10, "'<u2'") != NULL;
-        e.srgb = words || strstr(header + 10, "'|u1'") != NULL;
+        const char *dictionary = header + (header[6] == 1 ? 10 : 12); /* by version */
+        const bool words = strstr(dictionary, "'<u2'") != NULL;
+        e.srgb = words || strstr(dictionary, "'|u1'") || strstr(dictionary, "'<u1'");
         e.most = words ? 65535 : 255;
     }
     e.jpeg = e.srgb && !memcmp(header, "\xff\xd8", 2);

@@ -219,6 +219,18 @@ static int reduce(const char *spec, const char *path,
     return 0;
 }
 
+/* A mask of the whole numbers 0 and 1 is read as a picture's: 1 of 255, in sRGB. */
+static void faint_tell(const char *mask, const float *weight, size_t n)
+{
+    float most = 0;
+    for (size_t i = 0; i < n; i++) most = weight[i] > most ? weight[i] : most;
+    if (most > 0 && most < 4e-4F)
+        cli_say("importon: warning: --mask %s: its largest weight is %.2g; of whole "
+                "numbers 255 (65535 of 16 bits) "
+                "is 1, not 1",
+                mask, (double)most);
+}
+
 int picture_target(const char *spec, const char *mask, struct imp_target *target)
 {
     struct imp_film_info info = {.size = sizeof info},
@@ -280,6 +292,7 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
         colour_channels(weights, mask_info.channels, index);
         target->weights =
             extract(imp_film_mean(weights), n, mask_info.channels, index, 1, 1, 0);
+        faint_tell(mask, target->weights, n);
         for (size_t i = 0; whole && i < n; i++) ((float *)target->weights)[i] *= whole[i];
     } else if (whole) {
         target->weights = whole;

@@ -39,7 +39,7 @@ def integers_of(path: Any) -> Optional[tuple[bool, int]]:
     if head[:2] in (b"PF", b"Pf", b"#?") or head[:4] == b"\x76\x2f\x31\x01" or head[:3] == b"VOL":
         return None
     if head[:6] == b"\x93NUMPY":
-        return (False, 65535) if b"'<u2'" in head else (False, 255) if b"'|u1'" in head else None
+        return (False, 65535) if b"'<u2'" in head else (False, 255) if b"'|u1'" in head or b"'<u1'" in head else None
     if head[:4] == b"\x89PNG":
         return False, 65535 if head[24] == 16 else 255
     if head[:4] in (b"II*\0", b"MM\0*"):

@@ -45,7 +45,8 @@ static const struct kind {
     const char *descr;
     int bytes;
     double most; /* of whole numbers, which is 1 in the picture; 0: floats */
-} kinds[] = {{"<f4", 4, 0}, {"<f8", 8, 0}, {"|u1", 1, 255}, {"<u2", 2, 65535}};
+} kinds[] = {
+    {"<f4", 4, 0}, {"<f8", 8, 0}, {"|u1", 1, 255}, {"<u1", 1, 255}, {"<u2", 2, 65535}};
 
 /* Text of a dictionary's value without its quotes, cut to the room that there is. */
 static void unquoted(const char *s, char *text, size_t size)

@@ -147,19 +147,23 @@ static bool is_seen(const struct imp_scene *scene, const struct imp_wavelengths 
     return false;
 }
 
+enum { UNSEEN_TOLD = 20 }; /* warnings, at most */
+
 /* Warns of an object's spectra of light that are black in every picture, infrared ones beside an rgb
  * film. */
 static void unseen_tell(const struct imp_scene *scene, const struct imp_wavelengths *all,
                         const void *object, const struct imp_input_desc *desc,
-                        const struct imp_input *const *input, int n)
+                        const struct imp_input *const *input, int n, int *told)
 {
-    const struct imp_node *node = imp__node_of(scene->root, object);
     char where[512];
-    for (int j = 0; desc && node && j < n; j++) {
+    for (int j = 0; desc && *told < UNSEEN_TOLD && j < n; j++) {
         const struct imp_input *in = input[j];
         if (desc[j].role != IMP_EMISSION || in->texture || !in->spectrum) continue;
         const struct range r = range_of(in->spectrum);
         if (is_seen(scene, all, r)) continue;
+        const struct imp_node *node = imp__node_of(scene->root, object);
+        if (!node) continue;
+        ++*told;
         imp__warn(scene->ctx,
                   "%s: %s: %g to %g nm are seen by no film of the scene: it is black",
                   imp__loc_text(node->loc, where, sizeof where),
@@ -170,15 +174,16 @@ static void unseen_tell(const struct imp_scene *scene, const struct imp_waveleng
 static void all_unseen_tell(const struct imp_scene *scene,
                             const struct imp_wavelengths *all)
 {
+    int told = 0;
     for (int e = 0; e < scene->n_emitters; e++)
         unseen_tell(scene, all, scene->emitters[e], scene->emitters[e]->ops->inputs,
-                    scene->emitters[e]->input, scene->emitters[e]->n_in);
+                    scene->emitters[e]->input, scene->emitters[e]->n_in, &told);
     for (int k = 0; k < scene->n_bsdfs; k++)
         unseen_tell(scene, all, scene->bsdfs[k], scene->bsdfs[k]->ops->inputs,
-                    scene->bsdfs[k]->input, scene->bsdfs[k]->n_own);
+                    scene->bsdfs[k]->input, scene->bsdfs[k]->n_own, &told);
     for (int m = 0; m < scene->n_media; m++)
         unseen_tell(scene, all, scene->media[m], scene->media[m]->ops->inputs,
-                    scene->media[m]->input, scene->media[m]->n_own);
+                    scene->media[m]->input, scene->media[m]->n_own, &told);
 }
 
 enum imp_status imp__waves_build(struct imp_scene *scene)

@@ -158,6 +158,7 @@ static void check_npy_integers(void)
     } cases[] = {
         {"{'descr': '|u1', 'fortran_order': False, 'shape': (1, 2, 4), }", 4, 1, NULL},
         {"{'descr': '|u1', 'fortran_order': True, 'shape': (2, 4), }", 1, 1, NULL},
+        {"{'descr': '<u1', 'fortran_order': False, 'shape': (1, 2, 4), }", 4, 1, NULL},
         {"{'shape': (2, 2), 'fortran_order': False, 'descr': '<u2'}", 1, 2, NULL},
         {"{'descr': '<i4', 'fortran_order': False, 'shape': (1, 2), }", 0, 0,
          "a.npy: an array of '<i4': pictures are '<f4' or '<f8' (linear), '|u1' or "

@@ -3,6 +3,7 @@
  * Influences of the samples of one pixel: their squares by sets of samples, and their cross
  * terms with the pixels around. */
 #include "influence_pixel.h"
+#include "film/film_sums.h"
 #include "moved_pictures.h"
 #include <math.h>
 #include <string.h>
@@ -54,7 +55,8 @@ static bool sample_walk(const struct imp__functional *f, struct imp__influence_p
         for (size_t c = 0; c < C; c++) t->lane[c] = walk.L[c];
     }
     if (s->dropped == IMP_DROP_MEMORY) return false;
-    for (size_t k = 0; k < (K + 1) * C; k++) finite &= isfinite(t->lane[k]);
+    finite &= imp__fits_float(t->lane, (int)C); /* as pictures take them */
+    for (size_t k = C; k < (K + 1) * C; k++) finite &= isfinite(t->lane[k]);
     memset(t->S, 0, n * C * sizeof *t->S);
     if (s->dropped != IMP_DROP_NONE || !finite) return true;
     memcpy(t->S, t->lane, C * sizeof *t->S);

@@ -31,3 +31,11 @@ void imp__tile_walks_begin(const struct imp_tracer *tracer, const struct imp_til
     out->bundled =
         imp__supply_begin(bundled, arena, &pixels, numbers, n, group, &out->supply);
 }
+
+void imp__beyond_float_drop(struct imp_walk *walk, int channels)
+{
+    imp_spec L = {0};
+    for (int c = 0; c < channels; c++) L[c] = walk->L[c];
+    walk->dropped = imp__drop_cause(L);
+    walk->L = walk->values = (imp_spec){0};
+}

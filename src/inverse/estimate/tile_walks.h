@@ -5,6 +5,7 @@
 #ifndef IMP_INVERSE_TILE_WALKS_H
 #define IMP_INVERSE_TILE_WALKS_H
 
+#include "film/film_sums.h"
 #include "film/film_tiles.h"
 #include "replicates.h"
 #include "walk/bundle/supply.h"
@@ -29,12 +30,19 @@ static inline void imp__tile_walks_ready(struct imp__tile_walks *w)
 {
     if (w->bundled) imp__supply_ready(&w->supply);
 }
+/* An exposure may make more of a walk than pictures hold: they drop it, and so does this. */
+IMP_COLD void imp__beyond_float_drop(struct imp_walk *walk, int channels);
 /* The next walk, which is this one. */
 static inline void imp__tile_walk(struct imp__tile_walks *w, int x, int y, int64_t sample,
                                   struct imp_walk *walk)
 {
     if (w->bundled) imp__supply_take(&w->supply, x, y, sample, walk);
     else imp__walk_trace(w->tracer, w->arena, x, y, sample, walk);
+    const int channels = w->tracer->scene->channels;
+    const double value[3] = {walk->L[0], channels > 1 ? walk->L[1] : 0,
+                             channels > 1 ? walk->L[2] : 0};
+    if (imp_unlikely(!imp__fits_float(value, 3)) && !walk->dropped)
+        imp__beyond_float_drop(walk, channels);
 }
 
 #endif

@@ -18,25 +18,10 @@ struct replicate {
     size_t pixel;
 };
 
-/* An exposure may make more of a walk than pictures hold: they drop it, and so does this. */
-static IMP_COLD void drop_beyond_float(struct imp_walk *walk, const double value[3],
-                                       int channels)
-{
-    imp_spec L = {0};
-    for (int c = 0; c < channels; c++) L[c] = value[c];
-    walk->dropped = imp__drop_cause(L);
-    walk->L = walk->values = (imp_spec){0};
-}
-
 static void trace(const struct replicate *r, int set, int i, struct imp_walk *walk)
 {
     const int64_t sample = imp__replicates_first(r->plan, r->b, set) + i;
-    const int channels = r->job->channels;
-    double value[3];
     imp__tile_walk(r->walks, r->x, r->y, sample, walk);
-    for (int c = 0; c < channels; c++) value[c] = walk->L[c];
-    if (imp_unlikely(!imp__fits_float(value, channels)) && !walk->dropped)
-        drop_beyond_float(walk, value, channels);
     imp__tile_drop(r->worker, walk->dropped, r->x, r->y, sample);
     r->tally->rays += imp_max(2 * walk->n - 1, 1);
 }

@@ -17,3 +17,9 @@ for filter in box gaussian; do
         echo "exit $?"
     done
 done
+echo "- a mask of bytes that are 0 and 1 is a faint one"
+{ printf "\x93NUMPY\1\0\x76\0{'descr': '|u1', 'fortran_order': False, 'shape': (4, 4), }%58s\n" ' '; for ((i = 0; i < 16; i++)); do printf '\1'; done; } >bytes.npy
+importon gradient box.xml -m rgb --spp 4 --set sky.radiance.value=1,1,1 -T black.pfm --mask bytes.npy -p floor.bsdf.reflectance.value >faint && grep -c loss faint
+echo "- in Gauss-Newton's matrices, too"
+importon fit box.xml -m rgb --spp 4 --threads 1 -T black.pfm -p sky.radiance.value --optimizer lm --iterations 1 -o found.json
+echo "exit $?"
