@@ -605,7 +605,7 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
 /** Make a number of geometry a parameter, behind all others. Setting it moves the object.
  *
- *     NAME.pose              as imp_scene_add_pose
+ *     NAME.pose, pose_end    as imp_scene_add_pose; the second of where an instance that moves in time is at last
  *     NAME.scale             of a shape, instance, group or volume: 1 as the scene file has it, about the
  *                            middle of its box
  *     NAME.to_world          of a shape, instance, volume, camera, spot or projector: [3][4], the

@@ -156,6 +156,14 @@ static bool decompose(const struct imp_map *a, int side, struct imp_motion *m)
     return true;
 }
 
+static void short_way(struct imp_motion *m)
+{
+    double c = 0;
+    for (int k = 0; k < 4; k++) c += m->turn[0][k] * m->turn[1][k];
+    for (int k = 0; c < 0 && k < 4; k++) m->turn[1][k] = -m->turn[1][k];
+    m->angle = 2 * acos(fmin(fabs(c), 1));
+}
+
 bool imp__motion_make(const struct imp_map *from, const struct imp_map *to, double start,
                       double end, struct imp_motion *out)
 {
@@ -165,12 +173,50 @@ bool imp__motion_make(const struct imp_map *from, const struct imp_map *to, doub
     linear_part(to, b);
     if ((det3(a) < 0) != (det3(b) < 0)) return false;
     if (!decompose(from, 0, &m) || !decompose(to, 1, &m)) return false;
-    double c = 0;
-    for (int k = 0; k < 4; k++) c += m.turn[0][k] * m.turn[1][k];
-    for (int k = 0; c < 0 && k < 4; k++) m.turn[1][k] = -m.turn[1][k]; /* the short way */
-    m.angle = 2 * acos(fmin(fabs(c), 1));
+    short_way(&m);
     *out = m;
     return true;
+}
+
+#define SAME 1e-9 /* stretches differ, per stretch */
+
+bool imp__motion_is_rigid(const struct imp_motion *m)
+{
+    double most = 0;
+    for (int k = 0; k < 9; k++)
+        most = fmax(most, fabs(m->stretch[1][k] - m->stretch[0][k]));
+    return most <= SAME * norm(m->stretch[0]);
+}
+
+/* a b, as rotations: b first. */
+static void quaternion_product(const double a[4], const double b[4], double out[4])
+{
+    out[0] = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1];
+    out[1] = a[3] * b[1] + a[1] * b[3] + a[2] * b[0] - a[0] * b[2];
+    out[2] = a[3] * b[2] + a[2] * b[3] + a[0] * b[1] - a[1] * b[0];
+    out[3] = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2];
+}
+
+void imp__motion_turn(struct imp_motion *m, int side, const double by[3], imp_v3 shift)
+{
+    const double angle = sqrt(by[0] * by[0] + by[1] * by[1] + by[2] * by[2]),
+                 sine = angle > 0 ? sin(angle / 2) / angle : 0.5;
+    const double turn[4] = {sine * by[0], sine * by[1], sine * by[2], cos(angle / 2)};
+    const double old[4] = {m->turn[side][0], m->turn[side][1], m->turn[side][2],
+                           m->turn[side][3]};
+    quaternion_product(turn, old, m->turn[side]);
+    m->shift[side] = shift;
+    short_way(m);
+}
+
+imp_v3 imp__motion_rotation(const struct imp_motion *m)
+{
+    const double *a = m->turn[0], back[4] = {-a[0], -a[1], -a[2], a[3]};
+    double q[4];
+    quaternion_product(m->turn[1], back, q);
+    const imp_v3 v = imp__v3(q[0], q[1], q[2]);
+    const double sine = imp__length(v);
+    return v * (sine > 1e-8 ? 2 * atan2(sine, q[3]) / sine : 2);
 }
 
 static struct imp_map map_at(const struct imp_motion *m, double x)
@@ -195,9 +241,7 @@ static struct imp_map map_at(const struct imp_motion *m, double x)
 void imp__motion_at(const struct imp_motion *m, double time, struct imp_map *map,
                     struct imp_map *inverse)
 {
-    const double span = m->end - m->start;
-    const double x = span > 0 ? imp_clamp((time - m->start) / span, 0.0, 1.0) : 0;
-    *map = map_at(m, x);
+    *map = map_at(m, imp__motion_part(m, time));
     imp__map_inverse(map, inverse); /* what lies between is not singular either */
 }
 

@@ -47,6 +47,18 @@ bool imp__motion_make(const struct imp_map *from, const struct imp_map *to, doub
 /* The map at a time, and its inverse. */
 void imp__motion_at(const struct imp_motion *m, double time, struct imp_map *map,
                     struct imp_map *inverse);
+/* Does it turn and shift alone: is the stretch the same at both times? */
+bool imp__motion_is_rigid(const struct imp_motion *m);
+/* One of its maps, turned by a vector of rotation about the origin; then its translation is `shift`. */
+void imp__motion_turn(struct imp_motion *m, int side, const double by[3], imp_v3 shift);
+/* The vector of rotation, in the world, from its first map to its second. */
+imp_v3 imp__motion_rotation(const struct imp_motion *m);
+/* Which part of its way it has gone. */
+static inline double imp__motion_part(const struct imp_motion *m, double time)
+{
+    const double span = m->end - m->start;
+    return span > 0 ? imp_clamp((time - m->start) / span, 0.0, 1.0) : 0;
+}
 /* A box around all that a box passes. */
 void imp__motion_box(const struct imp_motion *m, imp_v3 *lo, imp_v3 *hi);
 

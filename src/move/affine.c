@@ -56,7 +56,7 @@ static int normals_of(const struct imp_scene *scene, const struct imp__glued *x,
         weight[0] = 1;
         return 1;
     }
-    const struct imp__corners f = imp__corners(scene, x->shape, x->prim, 0);
+    const struct imp__corners f = imp__corners(scene, x->shape, x->prim, 0, x->time);
     for (int k = 0; k < 3; k++) {
         n[k] = f.n[k];
         weight[k] = x->b[k] / x->length;

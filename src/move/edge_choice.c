@@ -112,12 +112,25 @@ void imp__edge_choice_draw(const struct imp__edge_choice *c, double u,
     point_at(c, k, u, c->chance[k + 1] - c->chance[k], out);
 }
 
-bool imp__edge_choice_silhouette(const struct imp__edge_choice *c, imp_v3 from,
+int imp__edge_choice_run(const struct imp__edge_choice *c, double *u, double *chance)
+{
+    const struct imp__edges *edges = c->edges;
+    int k = 0;
+    *chance = 1;
+    if (imp_likely(edges->n_runs == 1)) return 0;
+    while (k < edges->n_runs - 1 && !(*u < c->chance[edges->run[k + 1].first])) k++;
+    const double before = c->chance[edges->run[k].first];
+    *chance = c->chance[edges->run[k + 1].first] - before;
+    if (*chance > 0) *u = imp_clamp((*u - before) / *chance, 0.0, 1 - 0x1p-53);
+    return k;
+}
+
+bool imp__edge_choice_silhouette(const struct imp__edge_choice *c, int run, imp_v3 from,
                                  bool parallel, double u, struct imp__edge_point *out)
 {
     double pmf;
     const ptrdiff_t k =
-        imp__edge_tree_choose(c->tree, c->chance, from, parallel, &u, &pmf);
+        imp__edge_tree_choose(c->tree, run, c->chance, from, parallel, &u, &pmf);
     if (k < 0) return false;
     const double own = c->chance[k + 1] - c->chance[k];
     point_at(c, (size_t)k, c->chance[k] + u * own, pmf, out);

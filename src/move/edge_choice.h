@@ -23,6 +23,7 @@ struct imp__edge_tree {
     imp_context *ctx;
     const struct imp__edges *edges;
     struct imp__edge_node *node;
+    size_t *root; /* [n_runs] of the edges of a run; SIZE_MAX: it has none */
 };
 
 struct imp__edge_choice {
@@ -60,15 +61,18 @@ void imp__edge_choice_learn(struct imp__edge_choice *c, const double *moment,
 /* u in [0, 1); neighbours on the list have neighbouring u. */
 void imp__edge_choice_draw(const struct imp__edge_choice *c, double u,
                            struct imp__edge_point *out);
-/* A silhouette of lines that come from a point, or, where `parallel`, along this direction. False: this
- * u leads to none. */
-bool imp__edge_choice_silhouette(const struct imp__edge_choice *c, imp_v3 from,
+/* A run of the list by its probability, *chance; *u is uniform on [0, 1) again. */
+int imp__edge_choice_run(const struct imp__edge_choice *c, double *u, double *chance);
+/* A silhouette of this run to lines that come from a point, or, where `parallel`, along this direction, given
+ * where the run is at time 0. False: this u leads to none. */
+bool imp__edge_choice_silhouette(const struct imp__edge_choice *c, int run, imp_v3 from,
                                  bool parallel, double u, struct imp__edge_point *out);
 
 /* ---- edge_tree.c ---- */
-/* The edge that u chooses among those before and behind which `chance` [n + 1] says that so much
+/* The edge of a run that u chooses among those before and behind which `chance` [n + 1] says that so much
  * probability lies; *u is uniform on [0, 1) again, *pmf the probability. -1: none. */
-ptrdiff_t imp__edge_tree_choose(const struct imp__edge_tree *tree, const double *chance,
-                                imp_v3 from, bool parallel, double *u, double *pmf);
+ptrdiff_t imp__edge_tree_choose(const struct imp__edge_tree *tree, int run,
+                                const double *chance, imp_v3 from, bool parallel,
+                                double *u, double *pmf);
 
 #endif

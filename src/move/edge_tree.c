@@ -108,13 +108,20 @@ enum imp_status imp__edge_tree_build(const struct imp__edges *edges,
     if (edges->n == 0) return IMP_OK;
     out->node = imp__alloc_raw(edges->ctx, 2 * edges->n, sizeof *out->node);
     struct turned *turned = imp__alloc_raw(edges->ctx, edges->n, sizeof *turned);
-    if (out->node && turned) {
+    out->root = imp__alloc(edges->ctx, (size_t)edges->n_runs, sizeof *out->root);
+    if (out->node && turned && out->root) {
         struct box box;
+        size_t next = 0;
         for (size_t k = 0; k < edges->n; k++) turned[k] = normals(edges, &edges->edge[k]);
-        node_make(&(struct making){out, turned}, 0, 0, edges->n, &box);
+        for (int k = 0; k < edges->n_runs; k++) {
+            const size_t lo = edges->run[k].first, hi = edges->run[k + 1].first;
+            out->root[k] = hi > lo ? next : SIZE_MAX;
+            if (hi > lo)
+                next = node_make(&(struct making){out, turned}, next, lo, hi, &box);
+        }
     }
     imp__release(edges->ctx, turned);
-    return out->node && turned
+    return out->node && turned && out->root
                ? IMP_OK
                : imp__error(edges->ctx, IMP_E_NOMEM, "no memory for edges");
 }
@@ -122,6 +129,7 @@ enum imp_status imp__edge_tree_build(const struct imp__edges *edges,
 void imp__edge_tree_free(struct imp__edge_tree *tree)
 {
     if (tree->ctx) imp__release(tree->ctx, tree->node);
+    if (tree->ctx) imp__release(tree->ctx, tree->root);
     *tree = (struct imp__edge_tree){0};
 }
 
@@ -204,10 +212,12 @@ static ptrdiff_t leaf_choose(const struct imp__edge_tree *tree,
     return (ptrdiff_t)(leaf->lo + last);
 }
 
-ptrdiff_t imp__edge_tree_choose(const struct imp__edge_tree *tree, const double *chance,
-                                imp_v3 from, bool parallel, double *u, double *pmf)
+ptrdiff_t imp__edge_tree_choose(const struct imp__edge_tree *tree, int run,
+                                const double *chance, imp_v3 from, bool parallel,
+                                double *u, double *pmf)
 {
-    const struct imp__edge_node *node = tree->node;
+    if (imp_unlikely(tree->root[run] == SIZE_MAX)) return -1;
+    const struct imp__edge_node *node = tree->node + tree->root[run];
     *pmf = 1;
     while (node->second > 0) {
         struct below below;

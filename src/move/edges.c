@@ -11,15 +11,16 @@ void imp__edges_free(struct imp__edges *edges)
     imp__release(edges->ctx, edges->arc);
     imp__release(edges->ctx, edges->face);
     imp__release(edges->ctx, edges->body);
+    imp__release(edges->ctx, edges->run);
     *edges = (struct imp__edges){0};
 }
 
 struct imp__glued imp__edge_glued(const struct imp__edges *edges,
                                   const struct imp_scene *scene,
-                                  const struct imp__edge *e, int k, imp_v3 p)
+                                  const struct imp__edge *e, int k, double time, imp_v3 p)
 {
     const struct imp__edge_face *f = &edges->face[e->first + (size_t)k];
-    return imp__glued_near(scene, f->shape, f->prim, f->place, p, f->n);
+    return imp__glued_near(scene, f->shape, f->prim, f->place, time, p, f->n);
 }
 
 void imp__seam_bar(const struct imp__edges *edges, const struct imp__edge *e, imp_v3 m,

@@ -46,6 +46,12 @@ enum imp__edges_of {
     IMP_EDGES_LAMPS_BORDERS /* shapes that shine, and borders: by which the two are found to meet */
 };
 
+/* The run of edges that move in time with one instance, or rest, behind those of others. */
+struct imp__edge_run {
+    size_t first;
+    int instance; /* of the scene; -1: they rest */
+};
+
 struct imp__edges {
     imp_context *ctx;
     size_t n_bodies;
@@ -55,6 +61,10 @@ struct imp__edges {
     size_t n, n_faces;
     struct imp__edge *edge; /* [n], along a curve through space: neighbours are near */
     struct imp__edge_face *face; /* [n_faces] */
+    /* What moves in time is where it is at time 0. The first run rests; behind the last one is where the
+     * list ends. */
+    int n_runs;
+    struct imp__edge_run *run; /* [n_runs + 1] */
     /* Edges of a body that lie in the surface of another and have faces on both sides of it: the
      * first two faces, then one of the other. They are in `edge`, too, with their own faces. */
     size_t n_laid;
@@ -66,7 +76,7 @@ struct imp__edges {
 /* All edges of the scene's shapes of triangles, flat or with vertex normals, also in instances.
  * IMP_E_UNSUPPORTED, with its name: another shape that is no sphere, disk, circular cylinder or
  * bsplinecurve, or that
- * its instance makes none; an instance whose place changes with time. */
+ * its instance makes none; one that moves in time within a group. */
 enum imp_status imp__edges_build(const struct imp_scene *scene, enum imp__edges_of of,
                                  struct imp__edges *out);
 void imp__edges_free(struct imp__edges *edges);
@@ -74,7 +84,8 @@ void imp__edges_free(struct imp__edges *edges);
 /* The point of an edge as one that its face k carries along. */
 struct imp__glued imp__edge_glued(const struct imp__edges *edges,
                                   const struct imp_scene *scene,
-                                  const struct imp__edge *e, int k, imp_v3 p);
+                                  const struct imp__edge *e, int k, double time,
+                                  imp_v3 p);
 /* The velocity of a seam counts m: what that is to the points that faces 0 and 2 carry. */
 void imp__seam_bar(const struct imp__edges *edges, const struct imp__edge *e, imp_v3 m,
                    imp_v3 bar[2]);
@@ -104,6 +115,22 @@ static inline bool imp__edges_pair(const struct imp__edges *edges,
     if (edges->of == IMP_EDGES_BUT_BORDERS) return !first && !second;
     return (first && t->emitter >= 0) || (second && s->emitter >= 0);
 }
+
+/* ---- edges_timed.c ---- */
+/* From where an instance is at time 0 to where it is then, and back. */
+void imp__clock_map(const struct imp_scene *scene, int instance, double time,
+                    struct imp_map *there, struct imp_map *back);
+/* An edge of a run where it is then, with its faces from *faces [n_faces] on, its first 0. */
+void imp__edge_timed(const struct imp__edges *edges, const struct imp_map *there,
+                     const struct imp__edge *e, struct imp__edge *out,
+                     struct imp__edge_face *faces);
+/* IMP_E_UNSUPPORTED, with names: what moves in time and has edges that are in no list. */
+enum imp_status imp__clocks_allowed(const struct imp__edges *edges,
+                                    const struct imp_scene *scene);
+/* May something that moves in time meet this box between these times, or, where it is NULL, another body,
+ * *other? By the boxes that it sweeps. -1: nothing; else its shape. */
+int imp__clocks_meet(const struct imp__edges *edges, const struct imp_scene *scene,
+                     const double time[2], const imp_v3 *box, int *other);
 
 /* ---- edges_arcs.c ---- */
 /* Sets the arcs. */

@@ -173,7 +173,8 @@ void imp__arc_bar(const struct imp_scene *scene, const struct imp__arc *arc, imp
     imp_v3 in[2];
     for (int k = 0; k < 2; k++) {
         const struct imp__edge_face *f = &arc->side[k];
-        x[k] = imp__glued_near(scene, f->shape, imp_max(f->prim, 0), f->place, p, f->n);
+        x[k] =
+            imp__glued_near(scene, f->shape, imp_max(f->prim, 0), f->place, 0, p, f->n);
         in[k] = imp__cross(x[k].n, along);
     }
     for (int k = 0; k < 2; k++)

@@ -60,9 +60,9 @@ static enum imp_status bodies_list(struct building *x)
         for (int64_t place = 1; place <= places(scene) && !alone; place++) {
             const struct imp_group *g = imp__place_group(scene, place);
             if (!g)
-                return imp__error(
-                    x->ctx, IMP_E_UNSUPPORTED,
-                    "derivatives by what moves: an instance has a motion of its own");
+                return imp__error(x->ctx, IMP_E_UNSUPPORTED,
+                                  "derivatives by what moves: in a group an instance "
+                                  "moves in time");
             for (int k = g->first; k < g->first + g->n_shapes; k++, n++)
                 if (pass) x->out->body[n] = (struct imp__body){k, place};
         }
@@ -242,6 +242,39 @@ static uint64_t code_of(const struct building *x, const struct imp__edge *e)
     return code;
 }
 
+/* One that has edges of what rests too is refused (imp__clocks_allowed). */
+static int clock_of(const struct building *x, const struct imp__edge *e)
+{
+    return imp__place_clock(x->scene, x->out->face[e->first].place);
+}
+
+/* Edges of each run behind each other, in their order. */
+static enum imp_status runs_make(struct building *x, struct imp_keyed *keyed)
+{
+    const struct imp_scene *scene = x->scene;
+    struct imp__edges *out = x->out;
+    const size_t n = out->n;
+    size_t most = 0;
+    for (int k = 0; scene->world && k < scene->world->n_instances; k++)
+        most += scene->world->instance[k].motion != NULL;
+    out->run = imp__alloc(x->ctx, most + 2, sizeof *out->run);
+    if (!out->run) return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
+    out->n_runs = 1;
+    out->run[0].instance = -1;
+    out->run[1].first = n;
+    if (most == 0) return IMP_OK;
+    for (size_t k = 0; k < n; k++)
+        keyed[k].key = (uint64_t)(clock_of(x, &out->edge[keyed[k].value]) + 1);
+    imp__radix_sort(keyed, n, keyed + n);
+    for (size_t k = 0; k < n; k++) {
+        const int clock = (int)keyed[k].key - 1;
+        if (clock == out->run[out->n_runs - 1].instance) continue;
+        out->run[out->n_runs++] = (struct imp__edge_run){k, clock};
+    }
+    out->run[out->n_runs].first = n;
+    return IMP_OK;
+}
+
 static void faces_move(const struct imp__edges *out, struct imp__edge_face *to, size_t *n,
                        struct imp__edge *e)
 {
@@ -259,12 +292,15 @@ static enum imp_status edges_order(struct building *x)
     struct imp_keyed *keyed = imp__alloc_raw(x->ctx, 2 * n, sizeof *keyed);
     struct imp__edge_face *face = imp__alloc_raw(x->ctx, out->n_faces, sizeof *face);
     const bool fits = keyed && face;
+    enum imp_status st =
+        fits ? IMP_OK : imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
     for (size_t k = 0; k < n && fits; k++)
         keyed[k] = (struct imp_keyed){code_of(x, &out->edge[k]), k};
     if (fits) {
         size_t n_faces = 0;
         struct imp__edge spare;
         imp__radix_sort(keyed, n, keyed + n);
+        st = runs_make(x, keyed);
         imp__keyed_order(keyed, n, out->edge, sizeof *out->edge, &spare);
         for (size_t k = 0; k < n; k++) faces_move(out, face, &n_faces, &out->edge[k]);
         for (size_t k = 0; k < out->n_laid; k++)
@@ -275,7 +311,7 @@ static enum imp_status edges_order(struct building *x)
         imp__release(x->ctx, face);
     }
     imp__release(x->ctx, keyed);
-    return fits ? IMP_OK : imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
+    return st;
 }
 
 enum imp_status imp__edges_build(const struct imp_scene *scene, enum imp__edges_of of,
@@ -302,6 +338,7 @@ enum imp_status imp__edges_build(const struct imp_scene *scene, enum imp__edges_
     IMP_TRY(seams_add(&x));
     IMP_TRY(edges_order(&x));
     IMP_TRY(imp__arcs_find(scene, out));
+    IMP_TRY(imp__clocks_allowed(out, scene));
 out:
     imp__sides_free(&x.sides);
     imp__release(x.ctx, x.cut);

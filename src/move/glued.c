@@ -31,22 +31,24 @@ struct imp__corners imp__corners_mapped(const struct imp_scene *scene, int shape
 }
 
 struct imp__corners imp__corners(const struct imp_scene *scene, int shape, int prim,
-                                 int64_t place)
+                                 int64_t place, double time)
 {
     struct imp_map map[2];
-    if (place > 0) imp__place_map(scene, place, 0, &map[0], &map[1]);
+    if (place > 0) imp__place_map(scene, place, time, &map[0], &map[1]);
     return imp__corners_mapped(scene, shape, prim, place > 0 ? map : NULL);
 }
 
 static struct imp__glued glued(const struct imp_scene *scene, int shape, int prim,
-                               int64_t place, double b1, double b2, imp_v3 side)
+                               int64_t place, double time, double b1, double b2,
+                               imp_v3 side)
 {
-    const struct imp__corners f = imp__corners(scene, shape, prim, place);
+    const struct imp__corners f = imp__corners(scene, shape, prim, place, time);
     const imp_v3 e1 = f.p[1] - f.p[0], e2 = f.p[2] - f.p[0];
     struct imp__glued x = {.shape = shape,
                            .prim = prim,
                            .place = place,
                            .carrier = imp__carrier(scene, shape, place),
+                           .time = time,
                            .b = {1 - b1 - b2, b1, b2}};
     x.p = f.p[0] + e1 * b1 + e2 * b2;
     x.n = imp__normalize(imp__cross(e1, e2));
@@ -56,11 +58,12 @@ static struct imp__glued glued(const struct imp_scene *scene, int shape, int pri
 }
 
 struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
-                                const struct imp_located *x, int64_t place, imp_v3 n)
+                                const struct imp_located *x, int64_t place, double time,
+                                imp_v3 n)
 {
     const struct imp_shape *s = scene->shapes[shape];
     if (s->geometry == IMP_TRIANGLES)
-        return glued(scene, shape, x->prim, place, x->at[0], x->at[1], n);
+        return glued(scene, shape, x->prim, place, time, x->at[0], x->at[1], n);
     const double uv[2] = {x->at[0], x->at[1]};
     struct imp_surface at;
     int prim;
@@ -71,7 +74,7 @@ struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
 }
 
 struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int prim,
-                                  int64_t place, imp_v3 p, imp_v3 n)
+                                  int64_t place, double time, imp_v3 p, imp_v3 n)
 {
     const struct imp_shape *s = scene->shapes[shape];
     struct imp_map map[2];
@@ -79,9 +82,9 @@ struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int 
     if (s->geometry != IMP_TRIANGLES)
         return imp__glued_curved(scene, shape, prim, place, p, n);
     if (place > 0) {
-        imp__place_map(scene, place, 0, &map[0], &map[1]);
+        imp__place_map(scene, place, time, &map[0], &map[1]);
         p = imp__map_point(&map[1], p);
     }
     imp__triangle_weights(s, prim, &p, b);
-    return glued(scene, shape, prim, place, b[1], b[2], n);
+    return glued(scene, shape, prim, place, time, b[1], b[2], n);
 }

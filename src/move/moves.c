@@ -136,9 +136,9 @@ static enum imp_status instance_mover(const struct imp__moves *moves,
     const struct imp_instance *p =
         &moves->scene->world->instance[m->shape - IMP_MOVE_INSTANCE(0)];
     m->centre = imp__map_point(&p->to_world, (p->group->lo + p->group->hi) * 0.5);
-    m->count = m->kind == IMP_MOVE_POSE     ? 6
-               : m->kind == IMP_MOVE_AFFINE ? IMP_AFFINE_NUMBERS
-                                            : 1;
+    m->count = m->kind == IMP_MOVE_POSE || m->kind == IMP_MOVE_KEY ? 6
+               : m->kind == IMP_MOVE_AFFINE                        ? IMP_AFFINE_NUMBERS
+                                                                   : 1;
     return IMP_OK;
 }
 
@@ -302,6 +302,14 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
             out.shade += imp__cross(imp__move_vector(theta + 3), x->shade);
             out.turn += imp__dot(imp__move_vector(theta + 3), x->n);
             break;
+        case IMP_MOVE_KEY: {
+            const struct imp__turned by = imp__key_turned(moves, m, x->time, theta);
+            out.v += by.e + imp__cross(by.a, x->p - by.c);
+            out.n += imp__cross(by.a, x->n);
+            out.shade += imp__cross(by.a, x->shade);
+            out.turn += imp__dot(by.a, x->n);
+            break;
+        }
         case IMP_MOVE_SCALE:
             out.v += r * (m->rate * theta[0]);
             out.area += 2 * m->rate * theta[0];
@@ -337,6 +345,14 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
             if (x->smooth)
                 imp__move_vector_bar(theta + 3, imp__cross(x->shade, bar->shade));
             break;
+        case IMP_MOVE_KEY: {
+            const imp_v3 c = imp__key_turned(moves, m, x->time, NULL).c;
+            imp_v3 turn = imp__cross(x->p - c, bar->v) + imp__cross(x->n, bar->n) +
+                          x->n * bar->turn;
+            if (x->smooth) turn += imp__cross(x->shade, bar->shade);
+            imp__key_turned_bar(moves, m, x->time, bar->v, turn, theta);
+            break;
+        }
         case IMP_MOVE_SCALE:
             theta[0] += m->rate * (imp__dot(r, bar->v) + 2 * bar->area);
             break;

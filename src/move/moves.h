@@ -4,6 +4,8 @@
  * change by each of them. A mover is a shape or the camera with the numbers of one kind:
  *
  *     pose      e, a: every point X has the velocity  V = e + a x (X - c), c the centre (6)
+ *     key       of one of the two places between which an instance moves in time (6): at a time the instance
+ *               is turned and shifted by a blend of both (keys.c)
  *     scale     V = s (X - c) at the scale 1 of the shape as it is, or over that scale (1)
  *     affine    V = e + A (X - c), A row by row (12): of what is stretched or turned as a whole
  *     vertices  V = b_0 e_0 + b_1 e_1 + b_2 e_2, of a triangle with weights b (3 each)
@@ -49,6 +51,7 @@
 
 enum imp__move_kind {
     IMP_MOVE_POSE,
+    IMP_MOVE_KEY,
     IMP_MOVE_SCALE,
     IMP_MOVE_VERTICES,
     IMP_MOVE_NORMALS,
@@ -77,6 +80,7 @@ struct imp__mover {
     imp_v3
         axis; /* of a spot or ies light; of parallel light its direction; towards a sun; unit */
     imp_v3 twist;           /* of such an axis: a' turns its frame about it by twist.a' */
+    int key;                /* of IMP_MOVE_KEY: 0 is its first place, 1 its last */
     double rate;            /* the velocities' factor */
     size_t first, count;    /* its numbers */
     struct imp__fans *fans; /* of vertices with normals; else NULL */
@@ -103,6 +107,7 @@ struct imp__glued {
     int shape, prim;
     int64_t place; /* the instance that the shape is in (imp_hit.place); 0: none */
     int carrier;   /* by whose movers it moves, as imp__mover.shape */
+    double time;   /* at which it is there */
     double b[3];   /* weights of the vertices, as the shape's indices have them; of a
                       curve its place in the segment */
     imp_v3 p, n;   /* place, and the unit geometric normal of either side */
@@ -176,26 +181,39 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
 size_t imp__mover_touched(const struct imp__moves *moves, const struct imp__mover *mover,
                           const struct imp__glued *x, size_t index[IMP_TOUCHED_MOST]);
 
+/* ---- keys.c ---- */
+/* An instance that moves in time, at a time: its points p move by  e + a x (p - c), by theta [6] of one of
+ * its places; and the transpose. */
+struct imp__turned {
+    imp_v3 e, a, c;
+};
+struct imp__turned imp__key_turned(const struct imp__moves *moves,
+                                   const struct imp__mover *m, double time,
+                                   const double *theta);
+void imp__key_turned_bar(const struct imp__moves *moves, const struct imp__mover *m,
+                         double time, imp_v3 e_bar, imp_v3 a_bar, double *theta_bar);
+
 /* ---- glued.c ---- */
 /* What carries a shape at a place, as imp__mover.shape: itself, or the instance that it is in. */
 int imp__carrier(const struct imp_scene *scene, int shape, int64_t place);
-/* Corners of a triangle, world, and the normals of its vertices, which are of unit length where the
+/* Corners of a triangle at a time, world, and the normals of its vertices, which are of unit length where the
  * shape is in no instance; 0: it has none. */
 struct imp__corners {
     imp_v3 p[3], n[3];
     bool smooth;
 };
 struct imp__corners imp__corners(const struct imp_scene *scene, int shape, int prim,
-                                 int64_t place);
+                                 int64_t place, double time);
 /* The same by the maps of the place, to the world and back. NULL: there is none. */
 struct imp__corners imp__corners_mapped(const struct imp_scene *scene, int shape,
                                         int prim, const struct imp_map *map);
 /* The point of a triangle with these weights of its second and third vertex (located.h), or the
  * one next to p. n: the side of the normal that is wanted. */
 struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
-                                const struct imp_located *x, int64_t place, imp_v3 n);
+                                const struct imp_located *x, int64_t place, double time,
+                                imp_v3 n);
 struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int prim,
-                                  int64_t place, imp_v3 p, imp_v3 n);
+                                  int64_t place, double time, imp_v3 p, imp_v3 n);
 
 /* ---- curved.c: of a shape, in an instance where place > 0 ---- */
 /* Centre and radius of a sphere. False: another shape, or one that its instance stretches. */

@@ -75,12 +75,13 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     if (imp__pose_is_round(pose->kind)) return round_add(moves, pose);
     if (pose->group >= 0) return group_add(moves, pose);
     static const enum imp__move_kind kind[IMP_POSE_KINDS] = {
-        [IMP_POSE_RIGID] = IMP_MOVE_POSE,      [IMP_POSE_SCALE] = IMP_MOVE_SCALE,
-        [IMP_POSE_WORLD] = IMP_MOVE_AFFINE,    [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES,
-        [IMP_POSE_NORMALS] = IMP_MOVE_NORMALS, [IMP_POSE_CONTROL] = IMP_MOVE_CONTROL,
-        [IMP_POSE_POSITION] = IMP_MOVE_LIGHT,  [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT,
-        [IMP_POSE_TURN] = IMP_MOVE_TURN,       [IMP_POSE_SUN] = IMP_MOVE_SUN,
-        [IMP_POSE_SUN_RADIUS] = IMP_MOVE_DISC, [IMP_POSE_PICTURE] = IMP_MOVE_SPREAD};
+        [IMP_POSE_RIGID] = IMP_MOVE_POSE,        [IMP_POSE_RIGID_END] = IMP_MOVE_KEY,
+        [IMP_POSE_SCALE] = IMP_MOVE_SCALE,       [IMP_POSE_WORLD] = IMP_MOVE_AFFINE,
+        [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES, [IMP_POSE_NORMALS] = IMP_MOVE_NORMALS,
+        [IMP_POSE_CONTROL] = IMP_MOVE_CONTROL,   [IMP_POSE_POSITION] = IMP_MOVE_LIGHT,
+        [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT,   [IMP_POSE_TURN] = IMP_MOVE_TURN,
+        [IMP_POSE_SUN] = IMP_MOVE_SUN,           [IMP_POSE_SUN_RADIUS] = IMP_MOVE_DISC,
+        [IMP_POSE_PICTURE] = IMP_MOVE_SPREAD};
     int shape = pose->sensor          ? IMP_MOVE_CAMERA
                 : pose->instance >= 0 ? IMP_MOVE_INSTANCE(pose->instance)
                                       : pose->shape;
@@ -88,9 +89,12 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
         if (moves->scene->emitters[k] == pose->emitter) shape = IMP_MOVE_EMITTER(k);
     const bool turns = pose->kind == IMP_POSE_DIRECTION &&
                        !(pose->emitter->ops->flags & IMP_EMITTER_FAR);
+    const bool key = pose->instance >= 0 &&
+                     moves->scene->world->instance[pose->instance].motion != NULL;
     const enum imp_status st = imp__moves_add(
         moves,
-        turns ? IMP_MOVE_AXIS
+        key     ? IMP_MOVE_KEY
+        : turns ? IMP_MOVE_AXIS
         : imp__pose_is_view(pose->kind)
             ? (enum imp__move_kind)(IMP_MOVE_VIEW + pose->kind - IMP_POSE_FOV)
             : kind[pose->kind],
@@ -98,6 +102,12 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     if (st != IMP_OK) return st;
     struct imp__mover *m = &moves->mover[moves->n_movers - 1];
     const struct imp_pose *rigid = imp__pose_beside(pose, IMP_POSE_RIGID);
+    if (key) {
+        m->key = pose->kind == IMP_POSE_RIGID_END;
+        m->centre =
+            pose->centre + imp__v3(pose->number[0], pose->number[1], pose->number[2]);
+        return IMP_OK;
+    }
     if (pose->shape >= 0 || pose->instance >= 0 || pose->kind == IMP_POSE_RIGID) {
         m->centre = pose->object->centre;
         for (int i = 0; rigid && i < 3; i++) m->centre[i] += rigid->number[i];
@@ -125,7 +135,7 @@ void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mov
     if (mover->kind == IMP_MOVE_AFFINE &&
         imp__moves_cylinder(pose->scene, pose->shape, 0, &tube))
         imp__ends_bar(&tube, mover->centre, pose->kind, bar);
-    if (pose->kind != IMP_POSE_RIGID && pose->kind != IMP_POSE_TURN) return;
+    if (!imp__pose_is_rigid(pose->kind) && pose->kind != IMP_POSE_TURN) return;
     if (pose->group >= 0) group_bar(mover, pose, bar);
     double *a_bar = bar + (pose->kind == IMP_POSE_TURN ? 0 : 3);
     const double *a = pose->number + (a_bar - bar);

@@ -54,10 +54,17 @@ const struct imp_group *imp__place_group(const struct imp_scene *scene, int64_t 
     bool moves = false;
     while (place > 0) {
         const struct imp_instance *p = descend(g, &place);
-        moves |= p->motion != NULL;
+        moves |= p->motion && g != scene->world;
         g = p->group;
     }
     return moves ? NULL : g;
+}
+
+int imp__place_clock(const struct imp_scene *scene, int64_t place)
+{
+    if (place == 0) return -1;
+    const int k = imp__place_instance(scene, place);
+    return scene->world->instance[k].motion ? k : -1;
 }
 
 int imp__place_instance(const struct imp_scene *scene, int64_t place)

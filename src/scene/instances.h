@@ -78,7 +78,7 @@ imp__instance_local(const struct imp_instance *p, double time, struct imp_map ro
 }
 /* The box of an instance at all times, in the world around it. */
 void imp__instance_box(const struct imp_instance *p, imp_v3 *lo, imp_v3 *hi);
-/* The group that a place (> 0) is in; NULL: it moves, or one of the instances around it does. */
+/* The group that a place (> 0) is in; NULL: within a group an instance around it moves in time. */
 const struct imp_group *imp__place_group(const struct imp_scene *scene, int64_t place);
 /* Shapes of the scene that are in no group: the first so many. */
 static inline int imp__shapes_outside(const struct imp_scene *scene)
@@ -87,6 +87,8 @@ static inline int imp__shapes_outside(const struct imp_scene *scene)
 }
 /* Index of the scene's own instance that a place (> 0) is in. */
 int imp__place_instance(const struct imp_scene *scene, int64_t place);
+/* The same where that moves in time; -1: it rests, or the place is 0. */
+int imp__place_clock(const struct imp_scene *scene, int64_t place);
 /* From the group that a place (> 0) is in to the world at a time, and back. */
 void imp__place_map(const struct imp_scene *scene, int64_t place, double time,
                     struct imp_map *to_world, struct imp_map *to_local);

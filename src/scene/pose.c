@@ -231,6 +231,7 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
                                         p->start[8 + e % 4]);
     case IMP_POSE_TURN: return p->emitter ? imp__pose_turn_large(p->emitter, 0.5) : 0.5;
     case IMP_POSE_RIGID:
+    case IMP_POSE_RIGID_END:
         if (e >= 3) return 0.5;
         return 0.1 * scene / (p->group >= 0 ? imp__group_size(p) : 1);
     case IMP_POSE_SUN_RADIUS:

@@ -4,6 +4,8 @@
  *
  *     NAME.pose              of a shape, instance, group, volume, camera or radiancemeter: e and a, six numbers; a point that the
  *                            scene file has at X0 is at  X = c + e + R(a) s (X0 - c)
+ *     NAME.pose_end          of an instance that moves in time: the same, of its to_world_end; its pose is then
+ *                            that of its to_world
  *     NAME.scale             of a shape, instance, group or volume: s
  *     NAME.to_world          of a shape, instance, volume, camera, spot or projector: the upper three rows of the
  *                            matrix M that puts what the kind has at x at  X = M x, as mi.traverse has it
@@ -37,6 +39,7 @@
 
 enum imp_pose_kind {
     IMP_POSE_RIGID,
+    IMP_POSE_RIGID_END, /* of an instance that moves in time */
     IMP_POSE_SCALE,
     IMP_POSE_WORLD,
     IMP_POSE_VERTICES,
@@ -69,6 +72,12 @@ enum imp_pose_kind {
 static inline bool imp__pose_is_round(enum imp_pose_kind kind)
 {
     return kind >= IMP_POSE_CENTER && kind <= IMP_POSE_END_1;
+}
+
+/* Six numbers of a place. */
+static inline bool imp__pose_is_rigid(enum imp_pose_kind kind)
+{
+    return kind == IMP_POSE_RIGID || kind == IMP_POSE_RIGID_END;
 }
 
 /* A number of a camera's view (imp_sensor_ops.view): number kind - IMP_POSE_FOV. */

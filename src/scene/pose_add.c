@@ -109,7 +109,7 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
         p->kind == IMP_POSE_CONTROL ? &scene->shapes[p->shape]->curves : NULL;
     const bool place = (p->kind >= IMP_POSE_POSITION && p->kind <= IMP_POSE_SUN) ||
                        (imp__pose_is_round(p->kind) && p->kind != IMP_POSE_RADIUS);
-    p->n = p->kind == IMP_POSE_RIGID   ? 6
+    p->n = imp__pose_is_rigid(p->kind) ? 6
            : p->kind == IMP_POSE_WORLD ? 12
            : rows                      ? 3 * t->n_vertices
            : curve                     ? 4 * curve->n_points
@@ -172,6 +172,7 @@ static const struct tail {
     double lo, hi;
 } tails[IMP_POSE_KINDS] = {
     [IMP_POSE_RIGID] = {"pose", "scene units, radians", -INFINITY, INFINITY},
+    [IMP_POSE_RIGID_END] = {"pose_end", "scene units, radians", -INFINITY, INFINITY},
     [IMP_POSE_SCALE] = {"scale", "1", 1e-3, INFINITY},
     [IMP_POSE_WORLD] = {"to_world", "1, scene units", -INFINITY, INFINITY},
     [IMP_POSE_VERTICES] = {"vertex_positions", "scene units", -INFINITY, INFINITY},
@@ -244,7 +245,8 @@ static bool is_there(const struct imp_scene *scene, struct imp_pose *p)
             continue;
         if (q->kind == p->kind) return true;
         p->object = q->object;
-        p->centre = q->object->centre;
+        if (p->kind != IMP_POSE_RIGID_END && q->object->kind != IMP_POSE_RIGID_END)
+            p->centre = q->object->centre;
     }
     return false;
 }
@@ -359,7 +361,7 @@ enum imp_status imp_scene_add_geometry(imp_scene *scene, const char *name)
     }
     return imp__error(
         scene->ctx, IMP_E_ARG,
-        "'%s' names no number of geometry: NAME.pose, scale, to_world, "
+        "'%s' names no number of geometry: NAME.pose, pose_end, scale, to_world, "
         "vertex_positions, vertex_normals, control_points, center, radius, p0, p1, "
         "x_fov, "
         "principal_point_offset_x, _y, "

@@ -50,6 +50,7 @@ const char *imp__group_why(const struct imp_scene *scene, int k, enum imp_pose_k
         if (p->group != g) continue;
         const char *why = imp__instance_why(scene, i, kind);
         if (why) return why;
+        if (p->motion) return "an instance of it moves in time";
         if (!turns_and_scales(&p->to_world)) return "an instance stretches it";
         n++;
     }

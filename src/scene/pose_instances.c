@@ -31,7 +31,12 @@ const char *imp__instance_why(const struct imp_scene *scene, int k,
 {
     const struct imp_instance *p = &scene->world->instance[k];
     if (kind > IMP_POSE_WORLD) return "it is an instance";
-    if (p->motion) return "it has a motion of its own (to_world_end)";
+    if (kind == IMP_POSE_RIGID_END && !p->motion)
+        return "it is no instance that moves in time (to_world_end)";
+    if (!imp__pose_is_rigid(kind) && p->motion)
+        return "it moves in time, and has a pose and a pose_end";
+    if (p->motion && !imp__motion_is_rigid(p->motion))
+        return "its to_world_end stretches it otherwise than its to_world";
     if (scene->n_bodies > 0) return "there are media of graded index";
     if (scene->priorities) return "shapes have priorities";
     for (int i = 0; i < p->group->n_within; i++)
@@ -50,9 +55,14 @@ bool imp__instance_find(const struct imp_scene *scene, const char *name,
         imp__instance_name(scene, k, own);
         if (strcmp(own, name) != 0) continue;
         const struct imp_instance *there = &scene->world->instance[k];
+        struct imp_map room[2] = {there->to_world, there->to_local};
         p->instance = k;
-        p->centre =
-            imp__map_point(&there->to_world, (there->group->lo + there->group->hi) * 0.5);
+        if (there->motion)
+            imp__motion_at(there->motion,
+                           p->kind == IMP_POSE_RIGID_END ? there->motion->end
+                                                         : there->motion->start,
+                           &room[0], &room[1]);
+        p->centre = imp__map_point(&room[0], (there->group->lo + there->group->hi) * 0.5);
         p->rest_size = sizeof *there;
         return true;
     }
@@ -83,12 +93,43 @@ bool imp__pose_box(const struct imp_pose *p, imp_v3 *lo, imp_v3 *hi)
     return p->instance >= 0 || p->group >= 0 || p->shape >= 0;
 }
 
+/* Sets the motion of what moves in time, from where the file has both ends, and where it is at first. */
+static enum imp_status motion_place(const struct imp_pose *p, struct imp_instance *there)
+{
+    const struct imp_instance *rest = p->object->rest;
+    struct imp_motion *m = (struct imp_motion *)(uintptr_t)there->motion;
+    struct imp_map inverse;
+    bool moved = false;
+    if (m == rest->motion) m = imp__arena_array(&p->scene->arena, 1, sizeof *m);
+    if (!m) return imp__error(p->scene->ctx, IMP_E_NOMEM, "no memory for a pose");
+    *m = *rest->motion;
+    for (int side = 0; side < 2; side++) {
+        const struct imp_pose *q =
+            imp__pose_beside(p, side ? IMP_POSE_RIGID_END : IMP_POSE_RIGID);
+        const double *a = q ? q->number : NULL;
+        double R[9];
+        if (!a || !(a[0] || a[1] || a[2] || a[3] || a[4] || a[5])) continue;
+        const imp_v3 r = m->shift[side] - q->centre;
+        imp_v3 shift = q->centre + imp__v3(a[0], a[1], a[2]);
+        imp__rotation_of(a + 3, R);
+        for (int i = 0; i < 3; i++)
+            shift[i] += R[3 * i] * r[0] + R[3 * i + 1] * r[1] + R[3 * i + 2] * r[2];
+        imp__motion_turn(m, side, a + 3, shift);
+        moved = true;
+    }
+    there->motion = m;
+    there->to_world = rest->to_world;
+    if (moved) imp__motion_at(m, m->start, &there->to_world, &inverse);
+    return IMP_OK;
+}
+
 enum imp_status imp__instance_place(const struct imp_pose *p, int instance,
                                     const struct imp_map *to_world)
 {
     struct imp_instance *there = &p->scene->world->instance[instance];
     imp_v3 lo, hi;
-    there->to_world = *to_world;
+    if (there->motion) IMP_CHECKED(motion_place(p, there));
+    else there->to_world = *to_world;
     bool fits = imp__map_inverse(&there->to_world, &there->to_local);
     imp__instance_box(there, &lo, &hi);
     for (int k = 0; k < 3; k++) fits &= lo[k] > -IMP_REACH_MAX && hi[k] < IMP_REACH_MAX;

@@ -23,7 +23,8 @@ static bool middle_of(const struct imp_pose *p, imp_v3 *middle)
     const bool boxed = box_of(p, &lo, &hi);
     if (p->group >= 0) return false;
     switch (p->kind) {
-    case IMP_POSE_RIGID: *middle = p->centre + imp__v3(x[0], x[1], x[2]); return true;
+    case IMP_POSE_RIGID:
+    case IMP_POSE_RIGID_END: *middle = p->centre + imp__v3(x[0], x[1], x[2]); return true;
     case IMP_POSE_POSITION: *middle = imp__v3(x[0], x[1], x[2]); return true;
     case IMP_POSE_WORLD:
         *middle = boxed ? (lo + hi) * 0.5 : imp__v3(x[3], x[7], x[11]);

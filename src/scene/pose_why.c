@@ -82,6 +82,7 @@ const char *imp__pose_shape_why(const struct imp_scene *scene, const struct imp_
     if (kind >= IMP_POSE_FOV) return "it is a shape";
     const char *why = shape_why(scene, s);
     if (why || kind == IMP_POSE_RIGID) return why;
+    if (kind == IMP_POSE_RIGID_END) return "it is no instance that moves in time";
     if (kind == IMP_POSE_WORLD) return imp__world_shape_why(scene, s);
     return imp__pose_is_round(kind) ? round_why(scene, s, kind)
                                     : size_why(scene, s, kind);

@@ -312,14 +312,6 @@ int main(int argc, char **argv)
             "name='radius' value='.2'/></shape></shape>" PLACED(
                 "g", "<scale x='1.2'/><translate x='1.5' y='-1' z='1'/>", ""),
             "'ball'");
-    refused("an instance that moves",
-            DIRECT
-            "<shape type='shapegroup' id='g'><shape type='cube'><transform "
-            "name='to_world'><scale value='.2'/></transform></shape></shape>" PLACED(
-                "g", "<translate x='1.5' y='-1' z='1'/>",
-                "<transform name='to_world_end'><translate x='1.6' y='-1' "
-                "z='1'/></transform>"),
-            "motion of its own");
     refused("a tube through an instance",
             DIRECT
             "<shape type='shapegroup' id='g'><shape type='cube' id='box'><transform "

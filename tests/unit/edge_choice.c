@@ -88,7 +88,7 @@ static void draws_test(const struct imp__edge_choice *c, const char *name, doubl
         for (uint32_t i = 0; i < DRAWS / 4; i++) {
             struct imp__edge_point x = {0};
             const bool any = imp__edge_choice_silhouette(
-                c, from, parallel, imp__u01(imp__key(5, view, i), 0), &x);
+                c, 0, from, parallel, imp__u01(imp__key(5, view, i), 0), &x);
             off += any && !is_silhouette(c->edges, x.edge, from, parallel);
             tap_add(&found, any ? x.inv_pdf * weight(x.p) : 0);
         }

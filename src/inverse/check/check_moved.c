@@ -6,6 +6,44 @@
 #include <math.h>
 #include <string.h>
 
+/* The motion of an instance, one of whose places has these numbers. */
+static void motion_by(struct imp__moved_by *m, const double there[6])
+{
+    const struct imp_pose *p = m->pose;
+    const int side = p->kind == IMP_POSE_RIGID_END;
+    const imp_v3 from = p->centre + imp__v3(p->number[0], p->number[1], p->number[2]),
+                 to = p->centre + imp__v3(there[0], there[1], there[2]);
+    double old[9], new[9];
+    m->motion = *p->scene->world->instance[p->instance].motion;
+    imp__rotation_of(p->number + 3, old);
+    imp__rotation_of(there + 3, new);
+    /* Back to where the file has it, and from there. */
+    const double back[3] = {-p->number[3], -p->number[4], -p->number[5]};
+    const imp_v3 r = m->motion.shift[side] - from;
+    imp_v3 rest = {0}, shift = to;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) rest[i] += old[3 * j + i] * r[j];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) shift[i] += new[3 * i + j] * rest[j];
+    imp__motion_turn(&m->motion, side, back, rest);
+    imp__motion_turn(&m->motion, side, there + 3, shift);
+}
+
+void imp__moved_time(struct imp__moved_by *m, double time)
+{
+    const struct imp_pose *p = m->pose;
+    const struct imp_motion *then =
+        p->instance >= 0 ? p->scene->world->instance[p->instance].motion : NULL;
+    struct imp_map old[2], new[2];
+    if (!then) return;
+    imp__motion_at(then, time, &old[0], &old[1]);
+    imp__motion_at(&m->motion, time, &new[0], &new[1]);
+    const struct imp_map by = imp__map_product(&new[0], &old[1]);
+    for (int k = 0; k < 9; k++) m->turn[k] = by.m[k / 3 * 4 + k % 3];
+    m->from = imp__v3(old[0].m[3], old[0].m[7], old[0].m[11]);
+    m->to = imp__v3(new[0].m[3], new[0].m[7], new[0].m[11]);
+}
+
 void imp__move_by(struct imp__moved_by *m, size_t number, double h)
 {
     const struct imp_pose *p = m->pose;
@@ -16,6 +54,10 @@ void imp__move_by(struct imp__moved_by *m, size_t number, double h)
     if (p->kind == IMP_POSE_SCALE) {
         m->by = there[0] / p->number[0];
         m->to = m->from;
+        return;
+    }
+    if (p->instance >= 0 && p->scene->world->instance[p->instance].motion) {
+        motion_by(m, there);
         return;
     }
     if (p->kind != IMP_POSE_RIGID) {
@@ -82,7 +124,7 @@ struct imp__moved_at imp__moved_placed(const struct imp__moved_by *m,
 static imp_v3 turned_back(const struct imp__moved_by *m, int carrier, imp_v3 d)
 {
     const double *R = m->turn;
-    if (carrier != m->shape || m->pose->kind != IMP_POSE_RIGID) return d;
+    if (carrier != m->shape || !imp__moves_rigidly(m)) return d;
     return imp__v3(R[0] * d[0] + R[3] * d[1] + R[6] * d[2],
                    R[1] * d[0] + R[4] * d[1] + R[7] * d[2],
                    R[2] * d[0] + R[5] * d[1] + R[8] * d[2]);
@@ -98,8 +140,8 @@ static imp_v3 was_at(const struct imp__moved_by *m, int carrier, imp_v3 x)
 imp_v3 imp__moved_shade(const struct imp__moved_by *m, const struct imp__glued *then,
                         imp_v3 x)
 {
-    const struct imp__corners f =
-        imp__corners(m->c->problem->scene, then->shape, then->prim, then->place);
+    const struct imp__corners f = imp__corners(m->c->problem->scene, then->shape,
+                                               then->prim, then->place, then->time);
     const imp_v3 r = was_at(m, then->carrier, x) - then->p;
     double b[3] = {then->b[0], then->b[1], then->b[2]};
     imp_v3 N = {0};
@@ -109,16 +151,14 @@ imp_v3 imp__moved_shade(const struct imp__moved_by *m, const struct imp__glued *
     }
     for (int k = 0; k < 3; k++) N += f.n[k] * b[k];
     N = imp__normalize(N);
-    return then->carrier == m->shape && m->pose->kind == IMP_POSE_RIGID
-               ? imp__moved_turn(m, N)
-               : N;
+    return then->carrier == m->shape && imp__moves_rigidly(m) ? imp__moved_turn(m, N) : N;
 }
 
 struct imp__glued imp__moved_glued(const struct imp_scene *scene,
                                    const struct imp_vertex *v, double time)
 {
     struct imp__glued x =
-        imp__glued_at(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
+        imp__glued_at(scene, v->d.shape, &v->d.located, v->d.place, time, v->ng);
     struct imp_surface at;
     if (v->bsdf && !imp__is_plain(v->bsdf) &&
         imp__decided_surface(scene, &v->d, time, &at))
@@ -254,7 +294,7 @@ double imp__moved_light(const struct imp__moved_by *m, const struct imp_vertex *
         return imp__dot(r_old, r_old) / imp__dot(r, r);
     }
     const struct imp__glued y =
-        imp__glued_at(scene, e->shape->index, &v->d.light.located, 0, d);
+        imp__glued_at(scene, e->shape->index, &v->d.light.located, 0, old->time, d);
     const struct imp__moved_at there = imp__moved_placed(m, &y);
     w[0] = imp__normalize(there.p - x);
     w[1] = imp__normalize(y.p - old->p);

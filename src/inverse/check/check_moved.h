@@ -14,9 +14,10 @@
 struct imp__moved_by {
     const struct imp__check *c;
     const struct imp_pose *pose;
-    int shape;       /* or IMP_MOVE_CAMERA, or that of a light */
-    double turn[9];  /* R(a') R(a)^T */
-    double by;       /* scale after over before */
+    int shape;                /* or IMP_MOVE_CAMERA, or that of a light */
+    double turn[9];           /* R(a') R(a)^T */
+    double by;                /* scale after over before */
+    struct imp_motion motion; /* of an instance that moves in time, then */
     imp_v3 from, to; /* the centre, or a light's place or direction, before and after */
     struct imp__borders borders; /* of media */
     bool fades;                  /* there are media */
@@ -25,6 +26,12 @@ struct imp__moved_by {
 
 /* Moves it by h along a number. */
 void imp__move_by(struct imp__moved_by *m, size_t number, double h);
+/* Sets what an instance that moves in time is turned and shifted by at a time. Another thing: nothing. */
+void imp__moved_time(struct imp__moved_by *m, double time);
+static inline bool imp__moves_rigidly(const struct imp__moved_by *m)
+{
+    return imp__pose_is_rigid(m->pose->kind);
+}
 imp_v3 imp__moved_turn(const struct imp__moved_by *m, imp_v3 d);
 
 /* A point of a shape, its normal and a direction in it, and the curvature there, where the pose has

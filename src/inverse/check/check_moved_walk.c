@@ -147,8 +147,8 @@ static double light_frozen(const struct imp__moved_by *m, const struct stop *s,
     const double then = l->dist, d[2] = {then + farther, then};
     const imp_spec T = line_fades(m, s->v->to_light, s, to, d);
     if (s->floats && e->shape) {
-        const struct imp__glued y =
-            imp__glued_at(scene, e->shape->index, &l->located, 0, imp__decided_v3(l->d));
+        const struct imp__glued y = imp__glued_at(scene, e->shape->index, &l->located, 0,
+                                                  s->old.time, imp__decided_v3(l->d));
         const struct imp__moved_at now = imp__moved_placed(m, &y);
         all = lamp_ratio(m, s, IMP_SMOOTH, e, &now, &y, all * ratio * T);
         return imp__sum_used(P * s->v->b * all, scene->lanes);
@@ -299,8 +299,8 @@ static imp_spec step_frozen(const struct imp__moved_by *m, struct stop *s, imp_s
     if (!imp__goes_straight(s->v)) {
         const bool place =
             next->d.scatterer == IMP_AT_SKY || next->d.scatterer == IMP_IN_MEDIUM;
-        const imp_v3 p =
-            place ? imp__decided_v3(next->d.p) : imp__moved_glued(scene, next, 0).p;
+        const imp_v3 p = place ? imp__decided_v3(next->d.p)
+                               : imp__moved_glued(scene, next, s->old.time).p;
         w[1] = imp__normalize(next->d.scatterer == IMP_AT_SKY ? p : p - s->old.p);
         w[0] = mirrored ? leaving(s, w[1]) : w[1];
     }
@@ -333,6 +333,7 @@ double imp__frozen_walk(struct imp__moved_by *m, const struct imp_walk *walk, im
     struct stop here = {.v = NULL}, from = {.v = NULL}; /* from which light is sampled */
     bool seen = true;                                   /* by the camera's ray */
     double value = 0;
+    imp__moved_time(m, walk->time);
     m->extinction = (imp_spec){0};
     m->borders = (struct imp__borders){.scene = scene};
     if (through) m->borders = imp__borders_of(scene, m->c->tracer.sensor->medium);

@@ -24,7 +24,7 @@ static bool is_of_kind(const struct imp_pose *p)
 {
     if (p->emitter && p->emitter->ops->flags & IMP_EMITTER_ENVIRONMENT) return false;
     if (p->group >= 0) return false; /* several instances move by the same numbers */
-    return p->kind == IMP_POSE_RIGID || p->kind == IMP_POSE_SCALE ||
+    return imp__pose_is_rigid(p->kind) || p->kind == IMP_POSE_SCALE ||
            p->kind == IMP_POSE_POSITION || p->kind == IMP_POSE_DIRECTION;
 }
 

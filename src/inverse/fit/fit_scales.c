@@ -24,7 +24,7 @@ static double pose_scale(const struct imp_problem *p, const struct imp__block *b
 bool imp__block_is_rigid(const struct imp_problem *p, const struct imp__block *b)
 {
     const struct imp_pose *pose = imp__pose_of(p->scene, b->param);
-    return pose && pose->kind == IMP_POSE_RIGID && b->tie < 0;
+    return pose && imp__pose_is_rigid(pose->kind) && b->tie < 0;
 }
 
 static bool is_bounded(const struct imp__block *b)

@@ -10,7 +10,8 @@
 
 /* ---- Wavelengths (waves.c) ------------------------------------------------------- */
 
-/* When its light reaches the sensor. */
+/* When light reaches this sensor, by a number on [0, 1); and that of a walk. */
+double imp__sensor_time(const struct imp_sensor *s, double u);
 double imp__walk_time(const struct imp_tracer *tracer, const struct imp_walk *walk);
 
 /* Number from which the wavelengths of a walk are drawn, on [0, 1). */
@@ -28,12 +29,12 @@ bool imp__walk_wave(const struct imp_tracer *tracer, struct imp_arena *arena, do
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
                      int y, int64_t sample, struct imp_walk *walk);
 
-/* A walk with these random numbers that begins with a given ray, of these wavelengths (NULL: of
+/* A walk with these random numbers and time that begins with a given ray, of these wavelengths (NULL: of
  * colours), in this medium; `depth` vertices of a path lie before it. hit: what the ray meets; NULL: it
  * is traced. along: of such a hit, the direction to which the frame is turned about its normal; 0: it
  * stays. */
 void imp__walk_along(const struct imp_tracer *tracer, struct imp_arena *arena,
-                     struct imp_key key, const struct imp_sensor_ray *ray,
+                     struct imp_key key, double time, const struct imp_sensor_ray *ray,
                      const struct imp_waves *waves, int depth, struct imp_hit *hit,
                      imp_v3 along, const struct imp_medium *medium,
                      struct imp_walk *walk);

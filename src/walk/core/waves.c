@@ -62,6 +62,13 @@ int imp__tracer_set(const struct imp_tracer *tracer, int64_t n)
     return tracer->points ? set_of_points(&tracer->sensor->film, n, tracer->whole) : 1;
 }
 
+double imp__sensor_time(const struct imp_sensor *s, double u)
+{
+    if (!(s->close > s->open)) return s->open;
+    if (s->course) return imp__course_draw(s->course, s->open, s->close, u);
+    return s->open + u * (s->close - s->open);
+}
+
 /* Walk k of a set of n covers the k-th of n parts of [0, 1); of a hero with C wavelengths
  * the k-th of n parts of one of the C equal ranges, chosen at random: its companions
  * cover the others. */
@@ -72,8 +79,7 @@ double imp__walk_time(const struct imp_tracer *tracer, const struct imp_walk *wa
     const double u = walk->point.points
                          ? imp__point_number(walk->point, 0, IMP_SLOT_TIME)
                          : imp__u01(walk->key, imp__dim_start(IMP_DIM_TIME));
-    if (s->course) return imp__course_draw(s->course, s->open, s->close, u);
-    return s->open + u * (s->close - s->open);
+    return imp__sensor_time(s, u);
 }
 
 double imp__wave_draw(const struct imp_tracer *tracer, const struct imp_walk *walk,

@@ -259,6 +259,8 @@ void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
 {
     d->part = d->b->part[kind];
     d->end = &d->first;
+    d->edges = d->b->edges;
+    d->time = imp__sensor_time(d->b->tracer->sensor, imp__u01(d->key, IMP_EDGE_TIME));
     eye_draw(d);
     if (!waves_draw(d)) return;
     if (imp_unlikely(d->b->fog != NULL))

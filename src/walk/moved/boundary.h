@@ -80,6 +80,9 @@
  * with p the place on the border, which scatters light, and x'' the velocity of what sees that: points
  * of a medium whose stretch of a ray ends at a border keep their distances (moved.h).
  *
+ * While a shutter is open each draw has a time, of its lines and walks, and edges of instances that move in
+ * time are where they are then (move/edges_timed.c).
+ *
  * x' is the velocity of a vertex that slides, along the chain from the camera. W(x), what the
  * sensor makes of a unit of radiance times projected area that leaves x, is a connection to the
  * camera, or the walk goes on from x by transposed kernels and is connected from there: a walk

@@ -239,7 +239,8 @@ static enum imp_status ball_allowed(const struct imp__boundary *b)
 
 enum imp_status imp__boundary_allowed(const struct imp__boundary *b)
 {
-    enum imp_status st = imp__edges_allowed(b);
+    enum imp_status st = imp__timed_allowed(b);
+    if (st == IMP_OK) st = imp__edges_allowed(b);
     if (st == IMP_OK) st = imp__one_sided_allowed(b);
     if (st == IMP_OK) st = imp__borders_allowed(b);
     if (st == IMP_OK) st = turns_allowed(b);

@@ -26,7 +26,7 @@ static struct imp_round ball_around(const struct imp_scene *scene,
 {
     imp_v3 lo = {INFINITY, INFINITY, INFINITY, 0}, hi = -lo;
     for (int k = 0; k < x->n_facets; k++) {
-        const struct imp__corners f = imp__corners(scene, x->shape, k, x->place);
+        const struct imp__corners f = imp__corners(scene, x->shape, k, x->place, 0);
         for (int i = 0; i < 3; i++)
             for (int c = 0; c < 3; c++) {
                 lo[c] = imp_min(lo[c], f.p[i][c]);

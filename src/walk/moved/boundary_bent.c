@@ -21,7 +21,7 @@ static bool surface_met(const struct imp__edge_draw *d, const struct imp__bent_s
     const struct imp_scene *scene = d->b->tracer->scene;
     const imp_v3 o = imp__offset(s->q, n, n), down = -n;
     const double near = imp__dot(n, o - s->q);
-    if (!imp__intersect(scene, &o, &down, 0, 2 * near, hit)) return false;
+    if (!imp__intersect_at(scene, d->time, &o, &down, 0, 2 * near, hit)) return false;
     if (hit->place != s->place ||
         (hit->shape != s->shape &&
          hit->shape != imp__placed_shape(scene, s->shape, s->place)))
@@ -183,7 +183,7 @@ static bool is_on_glass(const struct imp__edge_draw *d)
 {
     struct imp_hit own = {.shape = -1};
     if (d->edge) {
-        const struct imp__edge_face *f = &d->b->edges->face[d->edge->first];
+        const struct imp__edge_face *f = &d->edges->face[d->edge->first];
         own.shape = f->shape;
         own.place = f->place;
     } else if (d->rim && d->item->shape >= 0) {

@@ -27,7 +27,7 @@ static imp_v3 bender_point(const struct imp__edge_draw *d, const struct imp__ben
         return p + (q - p) * (0.5 * (1 - sqrt(u[2])));
     }
     const int prim = imp_min((int)(u[0] * x->n_facets), x->n_facets - 1);
-    const struct imp__corners f = imp__corners(scene, x->shape, prim, x->place);
+    const struct imp__corners f = imp__corners(scene, x->shape, prim, x->place, 0);
     imp__uniform_triangle(&u[1], b);
     return f.p[0] + (f.p[1] - f.p[0]) * b[0] + (f.p[2] - f.p[0]) * b[1];
 }
@@ -112,7 +112,7 @@ static bool chain_draw(const struct imp__edge_draw *d, struct imp_key key, imp_v
         struct imp_hit hit;
         struct imp_surface at;
         struct imp__bent_surface s;
-        if (!imp__intersect(scene, &o, &w, 0, INFINITY, &hit)) break;
+        if (!imp__intersect_at(scene, d->time, &o, &w, 0, INFINITY, &hit)) break;
         imp__hit_surface(scene, &hit, &o, &w, &at);
         const struct imp_bsdf *b = imp__hit_bsdf(scene, &hit);
         const bool mirrors = imp__mirror_lobes(b) != 0;

@@ -20,7 +20,7 @@ static const struct imp__edge_face *face_seen(const struct imp__edge_draw *d, im
     const struct imp__edge_face *seen = NULL;
     double least = INFINITY;
     for (int k = 0; k < d->edge->n_faces; k++) {
-        const struct imp__edge_face *f = &d->b->edges->face[d->edge->first + (size_t)k];
+        const struct imp__edge_face *f = &d->edges->face[d->edge->first + (size_t)k];
         const double side = imp__dot(f->in, m), depth = imp__dot(f->in, w) / side;
         if (!(side > 0) || !(depth < least)) continue;
         least = depth;
@@ -71,7 +71,7 @@ static imp_v3 beside_face(const struct imp__edge_draw *d, const struct imp__edge
 static struct imp__corners corners_of(const struct imp__edge_draw *d,
                                       const struct imp__edge_face *f)
 {
-    return imp__corners(d->b->tracer->scene, f->shape, f->prim, f->place);
+    return imp__corners(d->b->tracer->scene, f->shape, f->prim, f->place, d->time);
 }
 
 imp_v3 imp__edge_beside(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m, double apart)
@@ -115,7 +115,7 @@ void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int b
                   struct imp_walk *walk)
 {
     const struct imp__corners facet =
-        imp__corners(d->b->tracer->scene, hit->shape, hit->prim, hit->place);
+        imp__corners(d->b->tracer->scene, hit->shape, hit->prim, hit->place, d->time);
     look_at(d, facet.p, o, hit, before, walk);
 }
 
@@ -130,7 +130,8 @@ bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, bool parallel, imp_
     const imp_v3 from = parallel ? o + (past - d->p) : o,
                  to = imp__normalize(past - from);
     struct imp_hit hit;
-    if (!imp__intersect(d->b->tracer->scene, &from, &to, d->near, INFINITY, &hit) ||
+    if (!imp__intersect_at(d->b->tracer->scene, d->time, &from, &to, d->near, INFINITY,
+                           &hit) ||
         !imp__edge_face_hit(d, f, &hit))
         return false;
     const imp_v3 middle = inwards(d, f, p);

@@ -39,7 +39,7 @@ void imp__draw_border(struct imp__edge_draw *d)
         meets = imp__edge_follow(d, o, w, 0, 0, &hit, &at, &line) && line.mirrors.n == 0;
         if (meets) T = line.T * line.times;
     } else {
-        meets = imp__intersect(scene, &o, &w, 0, INFINITY, &hit);
+        meets = imp__intersect_at(scene, d->time, &o, &w, 0, INFINITY, &hit);
         if (meets) imp__hit_surface(scene, &hit, &o, &w, &at);
     }
     const imp_spec sent =

@@ -4,6 +4,30 @@
 #include "boundary_parts.h"
 #include "math/warp.h"
 
+/* An edge that moves in time, where it is then. False: no memory. */
+static bool timed_set(struct imp__edge_draw *d, int clock)
+{
+    const struct imp__edge *at = d->edge;
+    struct imp__edge *edge = imp__arena_take(d->arena, 1, sizeof *edge);
+    struct imp__edges *edges = imp__arena_take(d->arena, 1, sizeof *edges);
+    struct imp__edge_face *face =
+        imp__arena_take(d->arena, (size_t)at->n_faces, sizeof *face);
+    struct imp_map there, back;
+    if (!edge || !edges || !face) {
+        d->no_memory = true;
+        return false;
+    }
+    imp__clock_map(d->b->tracer->scene, clock, d->time, &there, &back);
+    imp__edge_timed(d->b->edges, &there, at, edge, face);
+    *edges = (struct imp__edges){
+        .n = 1, .edge = edge, .n_faces = (size_t)at->n_faces, .face = face};
+    d->edge = edge;
+    d->edges = edges;
+    d->p = imp__map_point(&there, d->p);
+    d->along = imp__normalize(edge->b - edge->a);
+    return true;
+}
+
 static bool point_set(struct imp__edge_draw *d, const struct imp__edge_point *p)
 {
     d->edge = p->edge;
@@ -11,7 +35,10 @@ static bool point_set(struct imp__edge_draw *d, const struct imp__edge_point *p)
     d->along = imp__normalize(p->edge->b - p->edge->a);
     d->inv_pdf = p->inv_pdf / d->chance;
     d->cell = p->cell;
-    return true;
+    if (imp_likely(d->b->edges->n_runs == 1)) return true;
+    const int clock =
+        imp__place_clock(d->b->tracer->scene, d->b->edges->face[d->edge->first].place);
+    return clock < 0 || timed_set(d, clock);
 }
 
 bool imp__edge_item_choose(struct imp__edge_draw *d)
@@ -133,8 +160,17 @@ bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel)
 {
     struct imp__edge_point p;
     if (d->item) return ball_silhouette(d, from, parallel);
-    return imp__edge_choice_silhouette(d->choice, from, parallel, d->u, &p) &&
-           point_set(d, &p);
+    double u = d->u, chance;
+    const int run = imp__edge_choice_run(d->choice, &u, &chance),
+              clock = d->b->edges->run[run].instance;
+    if (imp_unlikely(clock >= 0)) {
+        struct imp_map there, back;
+        imp__clock_map(d->b->tracer->scene, clock, d->time, &there, &back);
+        from = parallel ? imp__map_vector(&back, from) : imp__map_point(&back, from);
+    }
+    if (!imp__edge_choice_silhouette(d->choice, run, from, parallel, u, &p)) return false;
+    p.inv_pdf /= chance;
+    return point_set(d, &p);
 }
 
 /* A line that touches the cylinder at a place, or the rims, along w. */
@@ -164,7 +200,7 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
                          imp__u01(d->key, IMP_EDGE_DIR_V)};
     if (!d->item) {
         imp__edge_choice_draw(d->choice, d->u, &p);
-        point_set(d, &p);
+        if (!point_set(d, &p)) return false;
         *w = imp__bent_direction(d, d->p, u, &d->spread);
         return true;
     }
@@ -188,7 +224,7 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
 /* Face k of the edge carries its point. */
 static struct imp__glued carried_by(const struct imp__edge_draw *d, int k)
 {
-    return imp__edge_glued(d->b->edges, d->b->tracer->scene, d->edge, k, d->p);
+    return imp__edge_glued(d->edges, d->b->tracer->scene, d->edge, k, d->time, d->p);
 }
 
 int imp__edge_ends(const struct imp__edge_draw *d, imp_v3 m, struct imp__flux_end *end)
@@ -201,8 +237,9 @@ int imp__edge_ends(const struct imp__edge_draw *d, imp_v3 m, struct imp__flux_en
         return 2;
     }
     if (!d->edge) {
-        const struct imp__glued at = imp__glued_near(
-            d->b->tracer->scene, d->item->shape, d->prim, d->item->place, d->p, d->out);
+        const struct imp__glued at =
+            imp__glued_near(d->b->tracer->scene, d->item->shape, d->prim, d->item->place,
+                            d->time, d->p, d->out);
         *end = imp__flux_glued(&at, m);
         return 1;
     }
@@ -210,7 +247,7 @@ int imp__edge_ends(const struct imp__edge_draw *d, imp_v3 m, struct imp__flux_en
     *end = imp__flux_glued(&first, m);
     if (!d->edge->seam) return 1;
     const struct imp__glued second = carried_by(d, 2);
-    imp__seam_bar(d->b->edges, d->edge, m, bar);
+    imp__seam_bar(d->edges, d->edge, m, bar);
     end[0].bar.v = bar[0];
     end[1] = imp__flux_glued(&second, bar[1]);
     return 2;

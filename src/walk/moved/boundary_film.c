@@ -100,11 +100,11 @@ bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, imp
     const double length = imp__length(r);
     *T = imp__edge_cleared(d, o, r * (1 / length), length);
     double from = 0;
-    while (imp__intersect(scene, &o, &r, from, 1 - IMP_BESIDE, &hit)) {
+    while (imp__intersect_at(scene, d->time, &o, &r, from, 1 - IMP_BESIDE, &hit)) {
         bool own = false;
         for (int k = 0; k < d->edge->n_faces && !own; k++)
-            own |= imp__edge_face_hit(d, &d->b->edges->face[d->edge->first + (size_t)k],
-                                      &hit);
+            own |=
+                imp__edge_face_hit(d, &d->edges->face[d->edge->first + (size_t)k], &hit);
         if (!own && !imp__edge_hit_passes(d, &hit, o, r, T)) return true;
         from = hit.t + 0.1 * IMP_BESIDE;
     }

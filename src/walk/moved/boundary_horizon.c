@@ -24,7 +24,7 @@ static void emission_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
     const struct imp_vertex *v = imp__walk_met(d, walk, &T);
     if (!v || imp__is_zero_used(T * v->e, d->waves)) return;
     const struct imp__glued y =
-        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, v->ng);
+        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, d->time, v->ng);
     const imp_v3 turn = x->n * (1 / imp__length(y.p - x->p));
     struct imp__edge_light light = {
         .w = -w, .light = T * v->e * times, .behind = 1, .horizon = true, .n_ends = 2};
@@ -47,8 +47,8 @@ void imp__draw_horizon(struct imp__edge_draw *d)
     look(d, &at, at.ng, w, &above);
     look(d, &at, -at.ng, w, &below);
     const struct imp_located located = {hit.prim, {(float)hit.u, (float)hit.v}};
-    const struct imp__glued x =
-        imp__glued_at(d->b->tracer->scene, hit.shape, &located, hit.place, at.ng);
+    const struct imp__glued x = imp__glued_at(d->b->tracer->scene, hit.shape, &located,
+                                              hit.place, d->time, at.ng);
     const double times = IMP_2PI * d->inv_pdf;
     emission_reach(d, &hit, &at, &x, &above, w, times);
     emission_reach(d, &hit, &at, &x, &below, w, -times);

@@ -83,7 +83,7 @@ static struct imp__flux_end source_end(const struct imp__edge_draw *d,
         return (struct imp__flux_end){{.p = s->p}, {.v = bar}, false, s->light + 1, {0}};
     const struct imp_located located = imp__located_drawn(shape, &s->y.located, s->y.uv);
     const struct imp__glued lit =
-        imp__glued_at(scene, shape->index, &located, 0, s->y.ng);
+        imp__glued_at(scene, shape->index, &located, 0, d->time, s->y.ng);
     return imp__flux_glued(&lit, bar);
 }
 
@@ -196,8 +196,8 @@ static void seen_work(struct imp__edge_draw *d, const struct line *l, imp_v3 o, 
         struct imp_surface at;
         struct imp__edge_light own = light;
         struct imp__meter_point x;
-        const bool meets =
-            imp__intersect(scene, &o, &to, (double)hit.t + contact, INFINITY, &hit);
+        const bool meets = imp__intersect_at(scene, d->time, &o, &to,
+                                             (double)hit.t + contact, INFINITY, &hit);
         if (meter && imp__meter_meet(d, o, to, meets ? &hit : NULL, &x)) {
             meter = false;
             if (imp__one_sided_sees(d, &x.at, o)) {
@@ -231,7 +231,7 @@ void imp__draw_light(struct imp__edge_draw *d)
     const double cosine = e->shape ? imp__dot(s.y.n, r) / t_y : 1;
     if (!(sine > 0) || !(cosine > IMP_GRAZING)) return;
     imp_v3 m = turned * (1 / (sine * t_y));
-    const int side = d->edge ? imp__edge_side(b->edges, d->edge, m) : round_side(d, m);
+    const int side = d->edge ? imp__edge_side(d->edges, d->edge, m) : round_side(d, m);
     if (side == 0) return;
     m *= (double)side;
 
@@ -252,7 +252,7 @@ void imp__draw_light(struct imp__edge_draw *d)
         meets = jump_follow(d, o, to, inside, t_y, &hit, &at, &T);
         if (imp__is_zero_used(T, d->waves)) return;
     } else if (imp_likely(!b->one_sided)) {
-        meets = imp__intersect(scene, &o, &to, 0, INFINITY, &hit);
+        meets = imp__intersect_at(scene, d->time, &o, &to, 0, INFINITY, &hit);
         if (meets && hit.t < 1 + IMP_CONTACT * b->size / t_y) return;
     }
 

@@ -38,14 +38,15 @@ static bool is_open(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, double t
                     struct imp__line *line)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
-    if (imp_likely(!d->b->passes)) return !imp__occluded_at(scene, 0, &o, &r, 0, till);
+    if (imp_likely(!d->b->passes))
+        return !imp__occluded_at(scene, d->time, &o, &r, 0, till);
     const imp_v3 end = o + r * till;
     for (int n = 0; n < PASSES_MOST; n++) {
         struct imp_hit hit;
         struct imp_surface at;
         const double reach = isfinite(till) ? 1 : INFINITY;
         const imp_v3 way = isfinite(till) ? end - o : r;
-        if (!imp__intersect(scene, &o, &way, 0, reach, &hit)) return true;
+        if (!imp__intersect_at(scene, d->time, &o, &way, 0, reach, &hit)) return true;
         const struct imp_bsdf *b = imp__hit_bsdf(scene, &hit);
         if (!b->straight) return false;
         imp__hit_surface(scene, &hit, &o, &way, &at);
@@ -272,7 +273,7 @@ bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
                                      hit, at, line);
     if (imp_unlikely(fades)) f = flight_of(d, o, w, from, dims);
     for (unsigned n = 0; n < PASSES_MOST; n++) {
-        const bool meets = imp__intersect(scene, &o, &w, from, INFINITY, hit);
+        const bool meets = imp__intersect_at(scene, d->time, &o, &w, from, INFINITY, hit);
         if (meets) imp__hit_surface(scene, hit, &o, &w, at);
         if (imp_unlikely(n > 0) && meets) hit->t = imp__dot(at->p - start, w);
         if (imp_unlikely(fades)) {
@@ -349,7 +350,7 @@ imp_spec imp__edge_near(struct imp__edge_draw *d, imp_v3 w, double distance, dou
 bool imp__edge_passes(const struct imp__edge_draw *d)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
-    const struct imp__edges *edges = d->b->edges;
+    const struct imp__edges *edges = d->edges;
     struct imp_hit own = {.shape = -1};
     if (imp_likely(!d->b->passes)) return false;
     if (!d->edge) {

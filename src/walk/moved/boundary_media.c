@@ -87,8 +87,8 @@ void imp__edge_walk(struct imp__edge_draw *d, const struct imp_sensor_ray *ray,
                     int before, struct imp_hit *hit, struct imp_walk *walk)
 {
     const imp_v3 o = ray->o + ray->d * (hit ? hit->t * (1 - IMP_BESIDE) : ray->t_near);
-    imp__walk_along(imp__edge_tracer(d), d->arena, imp__key_branch(d->key, 0, 1), ray,
-                    d->waves, before, hit, hit ? frame_along(d, hit) : (imp_v3){0},
+    imp__walk_along(imp__edge_tracer(d), d->arena, imp__key_branch(d->key, 0, 1), d->time,
+                    ray, d->waves, before, hit, hit ? frame_along(d, hit) : (imp_v3){0},
                     imp__edge_medium(d, o, ray->d), walk);
 }
 

@@ -34,8 +34,8 @@ struct imp__flux_end imp__meter_end(const struct imp__edge_draw *d,
                                     const struct imp_sensor_sample *to, imp_v3 bar)
 {
     const struct imp_sensor *s = d->b->tracer->sensor;
-    const struct imp__glued x =
-        imp__glued_at(d->b->tracer->scene, s->shape->index, &to->located, 0, to->ng);
+    const struct imp__glued x = imp__glued_at(d->b->tracer->scene, s->shape->index,
+                                              &to->located, 0, d->time, to->ng);
     return imp__flux_glued(&x, bar);
 }
 
@@ -51,7 +51,7 @@ static void emission_add(struct imp__edge_draw *d, const struct imp_sensor_sampl
     if (!f) return;
     f->n_ends = imp__edge_ends(d, m, f->end);
     const struct imp__glued y =
-        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, v->ng);
+        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, d->time, v->ng);
     const double t_x = imp__length(d->p - to->p),
                  far = imp_clamp(1 - t_x / imp__length(y.p - to->p), 0.0, 1.0);
     f->end[f->n_ends++] = imp__meter_end(d, to, m * -far);
@@ -161,8 +161,8 @@ void imp__meter_reach(struct imp__edge_draw *d, const struct imp__meter_point *x
     for (int k = 0; k < light->n_ends; k++) f->end[f->n_ends++] = light->end[k];
     const struct imp_located located =
         imp__located_drawn(s->shape, &x->at.located, x->at.uv);
-    const struct imp__glued at =
-        imp__glued_at(d->b->tracer->scene, s->shape->index, &located, 0, x->at.ng);
+    const struct imp__glued at = imp__glued_at(d->b->tracer->scene, s->shape->index,
+                                               &located, 0, d->time, x->at.ng);
     f->end[f->n_ends++] = imp__flux_glued(&at, light->slide);
 }
 

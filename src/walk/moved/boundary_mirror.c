@@ -51,7 +51,7 @@ bool imp__mirror_add(struct imp__edge_draw *d, struct imp__mirrors *all,
         scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)];
     const struct imp_located located = imp__located_hit(scene, shape, hit, at);
     *m = (struct imp__mirror){.on = NULL, .at = *at};
-    m->x = imp__glued_at(scene, hit->shape, &located, hit->place, at->ng);
+    m->x = imp__glued_at(scene, hit->shape, &located, hit->place, d->time, at->ng);
     if (all->last) all->last->on = m;
     else all->first = m;
     all->last = m;
@@ -165,7 +165,7 @@ static bool mirror_met(struct imp__edge_draw *d, const struct imp__plane *x, imp
     const struct imp_scene *scene = d->b->tracer->scene;
     const imp_v3 o = imp__offset(q, x->n, -w);
     const double near = imp__dot(x->n, q - o) / imp__dot(x->n, w);
-    if (!imp__intersect(scene, &o, &w, 0, 2 * near, hit)) return false;
+    if (!imp__intersect_at(scene, d->time, &o, &w, 0, 2 * near, hit)) return false;
     if (imp__plane_number(d->b, hit) != x - d->b->plane + 1) return false;
     imp__hit_surface(scene, hit, &o, &w, at);
     at->p = q;

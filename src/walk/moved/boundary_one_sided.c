@@ -12,8 +12,8 @@ bool imp__one_sided_sees(const struct imp__edge_draw *d, const struct imp_surfac
 {
     const imp_v3 from = imp__offset(at->p, at->ng, o - at->p), back = o - from;
     struct imp_hit between;
-    return !imp__intersect(d->b->tracer->scene, &from, &back, 0, 1 - IMP_BESIDE,
-                           &between);
+    return !imp__intersect_at(d->b->tracer->scene, d->time, &from, &back, 0,
+                              1 - IMP_BESIDE, &between);
 }
 
 #define BEHIND                                                                           \
@@ -27,7 +27,7 @@ bool imp__one_sided_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w,
     const struct imp_scene *scene = d->b->tracer->scene;
     const imp_v3 start = o + w * from;
     for (unsigned k = 0; k < WALLS; k++) {
-        if (!imp__intersect(scene, &o, &w, from, INFINITY, hit)) return false;
+        if (!imp__intersect_at(scene, d->time, &o, &w, from, INFINITY, hit)) return false;
         imp__hit_surface(scene, hit, &o, &w, at);
         const bool sees = imp__one_sided_sees(d, at, start);
         if (scene->shapes[hit->shape]->geometry != IMP_CURVES) return sees;
@@ -46,7 +46,8 @@ bool imp__one_sided_line(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, dou
     const double far = isfinite(till) ? till : 4 * d->b->size / imp__length(r);
     const imp_v3 end = o + r * far, back = r * -far;
     struct imp_hit between;
-    return !imp__intersect(d->b->tracer->scene, &end, &back, 0, 1 - IMP_BESIDE, &between);
+    return !imp__intersect_at(d->b->tracer->scene, d->time, &end, &back, 0,
+                              1 - IMP_BESIDE, &between);
 }
 
 static const char *shape_why(const struct imp__boundary *b, const struct imp__body *body)

@@ -22,7 +22,9 @@ struct imp__edge_draw {
     struct imp_arena *arena;
     struct imp_key key;
     const struct imp_waves *waves; /* of all its walks; NULL: colours */
+    double time;                   /* of its lines and walks */
     const struct imp__edge_choice *choice;
+    const struct imp__edges *edges;    /* those of `edge`: where they are at its time */
     const double *part;                /* of spheres and edges (boundary.h) */
     double u;                          /* by which the point is chosen */
     const struct imp__edge_item *item; /* NULL: an edge */
@@ -72,6 +74,7 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 #define IMP_EDGE_BENT                                                                    \
     (1u << 28) /* whether it is seen from a ball that is a mirror or glass */
 #define IMP_EDGE_MEDIUM (1u << 27) /* of the point of a medium's border */
+#define IMP_EDGE_TIME   (1u << 29)
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
  * rounding is a tenth of that. */
@@ -345,6 +348,8 @@ enum imp_status imp__boundary_allowed(const struct imp__boundary *b);
 /* ... of edges and seams; of borders of media. */
 enum imp_status imp__edges_allowed(const struct imp__boundary *b);
 enum imp_status imp__borders_allowed(const struct imp__boundary *b);
+/* ... of what moves in time. */
+enum imp_status imp__timed_allowed(const struct imp__boundary *b);
 
 /* ---- One draw of each kind ---- */
 void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);

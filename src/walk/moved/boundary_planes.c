@@ -86,7 +86,7 @@ static double side_of(const struct imp_scene *scene, const struct imp__body *bod
     for (; hit.prim < n; hit.prim++) {
         const imp_v3 unused = {0};
         const struct imp__corners f =
-            imp__corners(scene, body->shape, hit.prim, body->place);
+            imp__corners(scene, body->shape, hit.prim, body->place, 0);
         struct imp_surface at;
         imp__hit_surface(scene, &hit, &unused, &unused, &at);
         const double side = imp__dot(at.ng, imp__cross(f.p[1] - f.p[0], f.p[2] - f.p[0]));
@@ -120,7 +120,7 @@ static enum imp_status facets_add(struct imp__boundary *b, const struct imp__bod
     const double side = x.index > 0 ? side_of(scene, body, (int)n) : 1;
     for (size_t i = 0; i < n; i++) {
         const struct imp__corners f =
-            imp__corners(scene, body->shape, (int)i, body->place);
+            imp__corners(scene, body->shape, (int)i, body->place, 0);
         IMP_CHECKED(facet_add(b, first, x, f.p, side, &b->plane_of[b->n_facets++]));
         if (b->n_planes - first > MOST)
             return imp__error(

@@ -15,15 +15,15 @@
 #include "walk/core/step.h"
 #include "walk/lights/light_step.h"
 
-static void ray_through(const struct imp__boundary *b, double px, double py,
+static void ray_through(const struct imp__boundary *b, double time, double px, double py,
                         struct imp__edge_ray *out)
 {
     const struct imp_sensor *s = b->tracer->sensor;
     struct imp_sensor_ray ray;
     s->ops->ray(s, px, py, (const double[2]){0.5, 0.5}, &ray);
     *out = (struct imp__edge_ray){.o = ray.o, .d = ray.d, .px = px, .py = py};
-    out->meets = imp__intersect(b->tracer->scene, &ray.o, &ray.d, ray.t_near, ray.t_far,
-                                &out->hit);
+    out->meets = imp__intersect_at(b->tracer->scene, time, &ray.o, &ray.d, ray.t_near,
+                                   ray.t_far, &out->hit);
     if (out->meets)
         imp__hit_surface(b->tracer->scene, &out->hit, &ray.o, &ray.d, &out->at);
 }
@@ -32,14 +32,15 @@ void imp__ray_looked_at(const struct imp__boundary *b, imp_v3 *at)
 {
     const struct imp_film_desc *film = &b->tracer->sensor->film;
     struct imp__edge_ray ray;
-    ray_through(b, 0.5 * film->width, 0.5 * film->height, &ray);
+    ray_through(b, b->tracer->sensor->open, 0.5 * film->width, 0.5 * film->height, &ray);
     if (ray.meets) *at = ray.at.p;
 }
 
 void imp__ray_draw(struct imp__edge_draw *d)
 {
     const struct imp_film_desc *film = &d->b->tracer->sensor->film;
-    ray_through(d->b, d->lens[0] * film->width, d->lens[1] * film->height, &d->ray);
+    ray_through(d->b, d->time, d->lens[0] * film->width, d->lens[1] * film->height,
+                &d->ray);
     d->eye = d->ray.o;
 }
 
@@ -56,7 +57,7 @@ enum imp_status imp__rays_allowed(const struct imp__boundary *b)
                           : NULL;
     for (int y = 0; b->rays && !why && y < s->film.height; y++)
         for (int x = 0; !why && x < s->film.width; x++) {
-            ray_through(b, x + 0.5, y + 0.5, &ray);
+            ray_through(b, s->open, x + 0.5, y + 0.5, &ray);
             if (ray.meets && imp__moves_smooth(b->tracer->scene, ray.hit.shape))
                 why = "reads along a ray that meets a mesh with vertex normals "
                       "(face_normals makes it flat)";
@@ -97,8 +98,8 @@ void imp__ray_point_ends(const struct imp__edge_draw *d, imp_v3 shift,
         scene->shapes[imp__placed_shape(scene, ray->hit.shape, ray->hit.place)];
     const struct imp_located located =
         imp__located_hit(scene, shape, &ray->hit, &ray->at);
-    struct imp__link_point x =
-        imp__surface_point(scene, ray->hit.shape, &located, ray->hit.place, ray->at.ng);
+    struct imp__link_point x = imp__surface_point(scene, ray->hit.shape, &located,
+                                                  ray->hit.place, d->time, ray->at.ng);
     x.moved_bar = shift;
     const imp_v3 on_ray = imp__slide_bar(&x, ray->d, NULL);
     f->end[f->n_ends++] = imp__flux_glued(&x.x, x.bar.v);
@@ -122,7 +123,7 @@ static void emission_add(struct imp__edge_draw *d, const struct imp_walk *walk, 
     if (!f) return;
     f->n_ends = imp__edge_ends(d, m, f->end);
     const struct imp__glued y =
-        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, v->ng);
+        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, d->time, v->ng);
     const imp_v3 x = d->ray.at.p;
     const double far =
         imp_clamp(1 - imp__length(d->p - x) / imp__length(y.p - x), 0.0, 1.0);

@@ -74,7 +74,7 @@ static struct link *link_make(struct imp__edge_draw *d, struct link *before,
                                        .prim = hit->prim,
                                        .carried = imp__edge_waves(d)};
     const struct imp_located located = imp__located_hit(scene, shape, hit, at);
-    k->x = imp__surface_point(scene, hit->shape, &located, hit->place, at->ng);
+    k->x = imp__surface_point(scene, hit->shape, &located, hit->place, d->time, at->ng);
     k->bsdf = imp__shape_bsdf(scene, shape);
     k->at = *at;
     k->frame = (struct imp_frame){at->s, at->t, at->n};

@@ -17,7 +17,7 @@ int imp__seam_side(const struct imp__edge_draw *d, const struct imp_walk *walk)
         imp__is_zero_used(v->e, d->waves))
         return -1;
     for (int k = 0; k < 4; k += 2) {
-        const struct imp__edge_face *f = &d->b->edges->face[d->edge->first + (size_t)k];
+        const struct imp__edge_face *f = &d->edges->face[d->edge->first + (size_t)k];
         if (f->shape == v->d.shape && f->prim == v->d.located.prim && f->place == 0)
             return k / 2;
     }

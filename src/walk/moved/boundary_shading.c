@@ -40,7 +40,8 @@ static bool turning_at(const struct imp__edge_draw *d, const struct imp_hit *hit
                        struct turning *out)
 {
     const struct imp_located located = {hit->prim, {(float)hit->u, (float)hit->v}};
-    out->x = imp__glued_at(d->b->tracer->scene, hit->shape, &located, hit->place, at->ng);
+    out->x = imp__glued_at(d->b->tracer->scene, hit->shape, &located, hit->place, d->time,
+                           at->ng);
     if (!out->x.smooth) return false;
     const imp_v3 n = out->x.shade - out->x.n * imp__dot(out->x.n, out->x.shade);
     const imp_v3 grad = out->x.slope[0] * imp__dot(out->x.turn[0], w) +
@@ -67,7 +68,8 @@ static bool look_next(struct imp__edge_draw *d, const struct turning *x, double 
     const imp_v3 r = imp__normalize(x->x.p + x->beside * sign - o), by = x->next * sign;
     const struct imp__edge_face face = {
         .shape = x->x.shape, .prim = x->x.prim, .place = x->x.place};
-    if (!imp__intersect(d->b->tracer->scene, &o, &r, d->near, INFINITY, &hit) ||
+    if (!imp__intersect_at(d->b->tracer->scene, d->time, &o, &r, d->near, INFINITY,
+                           &hit) ||
         !imp__edge_face_hit(d, &face, &hit))
         return false;
     hit.u = x->x.b[1] + imp__dot(x->x.slope[0], by);

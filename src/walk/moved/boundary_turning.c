@@ -15,7 +15,7 @@
 static struct imp__corners corners(const struct imp__boundary *b,
                                    const struct imp__edge_item *item, size_t prim)
 {
-    return imp__corners(b->tracer->scene, item->shape, (int)prim, item->place);
+    return imp__corners(b->tracer->scene, item->shape, (int)prim, item->place, 0);
 }
 
 /* From p to the eye, of any length. */

@@ -332,8 +332,6 @@ static enum imp_status sensor_allowed(const struct imp_tracer *t)
         return refuse(t, "sensor", s->name, s->ops->name,
                       "is none of perspective, thinlens, orthographic, distant and "
                       "radiancemeter");
-    if (s->open != s->close)
-        return refuse(t, "sensor", s->name, s->ops->name, "has a shutter");
     return IMP_OK;
 }
 

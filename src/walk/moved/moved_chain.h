@@ -29,12 +29,11 @@ struct imp__link_point {
     imp_v3 beyond;       /* the place of x on the surface */
 };
 
-static inline struct imp__link_point imp__surface_point(const struct imp_scene *scene,
-                                                        int shape,
-                                                        const struct imp_located *at,
-                                                        int64_t place, imp_v3 n)
+static inline struct imp__link_point
+imp__surface_point(const struct imp_scene *scene, int shape, const struct imp_located *at,
+                   int64_t place, double time, imp_v3 n)
 {
-    return (struct imp__link_point){.x = imp__glued_at(scene, shape, at, place, n)};
+    return (struct imp__link_point){.x = imp__glued_at(scene, shape, at, place, time, n)};
 }
 /* It floats, and has no surface beyond it yet. */
 static inline struct imp__link_point imp__medium_point(imp_v3 p)
@@ -183,8 +182,8 @@ static inline void imp__float_aim(const struct imp__borders *borders,
     /* In double; hits are as exact as floats. */
     const double far = imp_max(imp__dot(at.ng, at.p - from) / imp__dot(at.ng, w), t);
     x->beyond = from + w * far;
-    x->x =
-        imp__glued_near(borders->scene, hit.shape, hit.prim, hit.place, x->beyond, at.ng);
+    x->x = imp__glued_near(borders->scene, hit.shape, hit.prim, hit.place, hit.time,
+                           x->beyond, at.ng);
     x->x.p = p;
     if (imp_unlikely(borders->any) &&
         imp__stretch_end(borders->scene, p, -w, &hit, &at, &border) && border)

@@ -184,8 +184,9 @@ void imp__light_sample_bar(struct imp__sweep *s, int k, const struct imp_vertex 
         sky_sample_bar(s, k, v);
         return;
     }
-    struct imp__link_point y = imp__surface_point(
-        scene, e->shape->index, &v->d.light.located, 0, imp__decided_v3(v->d.light.d));
+    struct imp__link_point y =
+        imp__surface_point(scene, e->shape->index, &v->d.light.located, 0, s->walk->time,
+                           imp__decided_v3(v->d.light.d));
     const imp_v3 w = imp__link_direction(&s->at[k], &y);
     const imp_spec light = s->piece[k].light;
     const double bar = imp__sum_used(light, scene->lanes);

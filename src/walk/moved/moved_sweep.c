@@ -77,7 +77,7 @@ static int read_walk(struct imp__sweep *s, imp_spec adjoint)
         } else {
             s->at[n] = sky ? imp__sky_point(imp__normalize(imp__decided_v3(v->d.p)))
                            : imp__surface_point(scene, v->d.shape, &v->d.located,
-                                                v->d.place, v->ng);
+                                                v->d.place, s->walk->time, v->ng);
         }
         if (imp_unlikely(s->fog || s->media)) media_read(s, n, v);
         if (imp_unlikely(s->at[n].floats)) place_read(s, n, v, P);

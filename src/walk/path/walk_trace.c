@@ -177,7 +177,7 @@ void imp__step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
 }
 
 void imp__walk_along(const struct imp_tracer *tracer, struct imp_arena *arena,
-                     struct imp_key key, const struct imp_sensor_ray *ray,
+                     struct imp_key key, double time, const struct imp_sensor_ray *ray,
                      const struct imp_waves *waves, int depth, struct imp_hit *hit,
                      imp_v3 along, const struct imp_medium *medium, struct imp_walk *walk)
 {
@@ -191,7 +191,7 @@ void imp__walk_along(const struct imp_tracer *tracer, struct imp_arena *arena,
     walk->ray = *ray;
     walk->depth = depth;
     walk->waves = waves;
-    walk->time = imp__walk_time(tracer, walk);
+    walk->time = time;
     step_begin(tracer, arena, walk, scratch, &s);
     s.depth = depth;
     if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) {
