@@ -68,7 +68,7 @@ static void kind_test(enum imp__move_kind kind, const char *name)
             bar[k] = 0;
         }
         const imp_v3 side = imp__v3(imp__u01(key, 2) - 0.5, imp__u01(key, 3) - 0.5, 0.1);
-        struct imp__glued x = imp__glued_at(scene, 0, &at, 0, side);
+        struct imp__glued x = imp__glued_at(scene, 0, &at, 0, 0, side);
         const struct triangle rest = triangle_moved(&m, 0, at.prim, theta, 0);
         real along[3];
         triangle_grain(&rest, along);
@@ -147,7 +147,7 @@ static void file_test(void)
             imp__located_surface(at[k], 0, &x, 0, 0, &s[k]);
             for (int i = 0; i < 3; i++) p[k][i] = s[k].p[i];
         }
-        const struct imp__glued g = imp__glued_at(at[1], 0, &x, 0, s[1].ng);
+        const struct imp__glued g = imp__glued_at(at[1], 0, &x, 0, 0, s[1].ng);
         const struct imp__velocity v = imp__velocity_of(&m, &g, theta);
         for (int i = 0; i < 3; i++) {
             worst = fmax(worst, fabs(v.v[i] - (p[2][i] - p[0][i]) / (2 * h)));

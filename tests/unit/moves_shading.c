@@ -96,7 +96,7 @@ static void points_test(imp_scene *scene, enum imp__move_kind kind, const char *
         const struct imp_located at = {(int)i, {(float)b[0], (float)b[1]}};
         struct imp_surface here, there;
         imp__located_surface(scene, 0, &at, 0, 0, &here);
-        const struct imp__glued x = imp__glued_at(scene, 0, &at, 0, here.ng);
+        const struct imp__glued x = imp__glued_at(scene, 0, &at, 0, 0, here.ng);
         const double h = 1e-3;
         struct imp_hit hit = {.prim = (int)i, .u = at.at[0] + h, .v = at.at[1] - 2 * h};
         shape->ops->surface(shape, &hit, NULL, NULL, &there);

@@ -177,7 +177,7 @@ static void velocity_test(void)
         imp__seam_bar(&e, x, w, bar);
         struct imp__glued g[2];
         for (int i = 0; i < 2; i++) {
-            g[i] = imp__edge_glued(&e, scene, x, 2 * i, p);
+            g[i] = imp__edge_glued(&e, scene, x, 2 * i, 0, p);
             rate += imp__dot(bar[i], imp__velocity_of(&m, &g[i], theta).v);
         }
         for (int s = 0; s < 2; s++) {

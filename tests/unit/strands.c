@@ -132,7 +132,7 @@ static void velocities_test(void)
         e = imp__normalize(e - a * imp__dot(a, e));
         const struct place at = surface_at((const double(*)[4])rest, segment, v, a, e);
         const struct imp__glued x =
-            imp__glued_near(scene, 0, segment, 0, at.p, at.n * side);
+            imp__glued_near(scene, 0, segment, 0, 0, at.p, at.n * side);
         back = fmax(back, fmax(apart(x.p, at.p), apart(x.n, at.n * side)));
         /* Velocities. */
         struct place by[4];
@@ -263,8 +263,8 @@ static void instance_test(void)
             (int)(i % 4), {(float)imp__u01(key, 0), (float)imp__u01(key, 1)}};
         struct imp_surface here;
         imp__located_surface(scene, shape, &at, 1, 0, &here);
-        const struct imp__glued x = imp__glued_at(scene, shape, &at, 1, here.ng),
-                                own = imp__glued_at(scene, shape, &at, 0, here.ng);
+        const struct imp__glued x = imp__glued_at(scene, shape, &at, 1, 0, here.ng),
+                                own = imp__glued_at(scene, shape, &at, 0, 0, here.ng);
         worst = fmax(worst, fmax(apart(x.p, here.p), apart(x.n, here.ng)));
         const imp_v3 shift = x.slope[0] + x.slope[1] * 0.3;
         const imp_v3 inside = imp__map_vector(&map[1], shift);
