@@ -42,7 +42,7 @@ const char *imp__instance_why(const struct imp_scene *scene, int k,
     for (int i = 0; i < p->group->n_within; i++)
         if (scene->shapes[p->group->within[i]]->interior)
             return "a shape in it bounds a medium";
-    if (kind != IMP_POSE_RIGID && p->raised)
+    if (!imp__pose_is_rigid(kind) && p->raised)
         return "the heights of its bump maps are made for its size";
     return kind == IMP_POSE_WORLD ? imp__world_instance_why(scene, k) : NULL;
 }

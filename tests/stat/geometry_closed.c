@@ -337,8 +337,8 @@ static double radiance_at(const struct imp_tracer *t, struct imp_arena *arena, d
     struct imp_sensor_ray ray;
     struct imp_walk walk;
     t->sensor->ops->ray(t->sensor, x * w, y * w, lens, &ray);
-    imp__walk_along(t, arena, imp__key(99, 1, number), 0, &ray, NULL, 0, NULL, (imp_v3){0},
-                    NULL, &walk);
+    imp__walk_along(t, arena, imp__key(99, 1, number), 0, &ray, NULL, 0, NULL,
+                    (imp_v3){0}, NULL, &walk);
     imp__arena_rewind(arena, mark);
     return walk.L[0];
 }
