@@ -13,9 +13,11 @@
 
 enum { MEAN_NUMBERS_MAX = 16, MEAN_VALUES_MAX = 1024 * 3 };
 
-/* d (mean of sensor 0's picture)/d numbers of a parameter, added to out [numbers] for each seed. */
-static inline void mean_gradient(imp_context *ctx, imp_scene *scene, const char *name,
-                                 int spp, int seeds, struct tap_stat *out)
+/* d (mean of sensor 0's picture)/d numbers of some parameters, added to out [numbers of all] for each
+ * seed. */
+static inline void mean_gradients(imp_context *ctx, imp_scene *scene,
+                                  const char *const *name, int n_names, int spp,
+                                  int seeds, struct tap_stat *out)
 {
     static float adjoint[MEAN_VALUES_MAX];
     struct imp_scene_info info = {.size = sizeof info};
@@ -28,7 +30,7 @@ static inline void mean_gradient(imp_context *ctx, imp_scene *scene, const char 
     for (size_t k = 0; k < n && k < MEAN_VALUES_MAX; k++)
         adjoint[k] = (float)(1. / (double)n);
     test_must(ctx, imp_problem_create(scene, &p));
-    test_must(ctx, imp_problem_activate(p, name));
+    for (int k = 0; k < n_names; k++) test_must(ctx, imp_problem_activate(p, name[k]));
     const size_t numbers = imp_problem_n_variables(p);
     if (n > MEAN_VALUES_MAX || numbers > MEAN_NUMBERS_MAX) exit(99);
     for (int s = 0; s < seeds; s++) {
@@ -39,6 +41,12 @@ static inline void mean_gradient(imp_context *ctx, imp_scene *scene, const char 
         for (size_t k = 0; k < numbers; k++) tap_add(&out[k], g[k]);
     }
     imp_problem_destroy(p);
+}
+
+static inline void mean_gradient(imp_context *ctx, imp_scene *scene, const char *name,
+                                 int spp, int seeds, struct tap_stat *out)
+{
+    mean_gradients(ctx, scene, &name, 1, spp, seeds, out);
 }
 
 /* One number of `name`, a parameter by what moves, in a scene of these objects: within `most` of ref. */
