@@ -161,7 +161,8 @@ class Scene:
     def add_geometry(self, name: str) -> str:
         """Make a number of geometry a parameter.
 
-        `NAME.pose` as `add_pose`; `NAME.pose_end` of an instance that moves in time, likewise of where it is at last; `NAME.scale` of a shape, instance, group or gridvolume; `NAME.to_world` of a shape,
+        `NAME.pose` as `add_pose`; `NAME.pose_end` of an instance that moves in time, likewise of where it
+        is at last; `NAME.scale` of a shape, instance, group or gridvolume; `NAME.to_world` of a shape,
         instance, gridvolume, camera, spot or projector, the upper three rows of its matrix; `NAME.vertex_positions` and `NAME.vertex_normals` of a mesh;
         `NAME.control_points` of a bsplinecurve, x, y, z and radius of each;
         `NAME.center` and `NAME.radius` of a sphere; `NAME.p0`, `NAME.p1` and `NAME.radius` of a circular

@@ -219,6 +219,39 @@ def test_to_world():
     return "the mean by a translation %s" % np.round(g[:, 3], 4)
 
 
+def test_pose_end():
+    """Both places of an instance that moves in time: set as the dictionary has them, and differentiated"""
+    T = im.ScalarTransform4f
+
+    def scene(shift=0):
+        film = {"type": "hdrfilm", "width": 8, "height": 8, "rfilter": {"type": "box"}}
+        camera = {"type": "perspective", "to_world": T().look_at(origin=[0, 0, 5], target=[0, 0, 0], up=[0, 1, 0]),
+                  "shutter_open": 0., "shutter_close": 1., "film": film}
+        tile = {"type": "rectangle", "to_world": T().scale(.4)}
+        ends = T().translate([-.6, 0, 0]), T().translate([.6 + shift, .2, .1]).rotate([0, 0, 1], 40)
+        return im.load_dict({"type": "scene", "integrator": {"type": "path", "max_depth": 2}, "camera": camera,
+                             "sky": {"type": "constant"}, "group": {"type": "shapegroup", "tile": tile},
+                             "cart": {"type": "instance", "to_world": ends[0], "to_world_end": ends[1],
+                                      "shapegroup": {"type": "ref", "id": "group"}}})
+    s = scene()
+    assert "cart.pose_end" in s.geometry_names, s.geometry_names
+    names = [s.add_geometry(name) for name in ("cart.pose", "cart.pose_end", "camera.pose")]
+    p = im.traverse(s)
+    assert np.array_equal(p["cart.pose_end"], np.zeros(6)) and p.info("cart.pose_end").differentiable
+    p["cart.pose_end"] = [.25, 0, 0, 0, 0, 0]
+    assert np.allclose(im.render(s, spp=16, seed=3), im.render(scene(.25), spp=16, seed=3), rtol=1e-5)
+
+    # All is shifted: nothing changes.
+    grad = im.functional(s, names, spp=64, seed=3).grad
+    g = [grad[name] for name in names]
+    assert all(e.shape == (6,) for e in g)
+    most = np.abs(g[1][:3]).max()
+    assert most > 1e-3 and np.abs(sum(e[:3] for e in g)).max() < 1e-6 * most, g
+    raises(im.UnsupportedError, lambda: scene().add_geometry("cart.scale"), "moves in time")
+    raises(im.UnsupportedError, lambda: scene().add_geometry("camera.pose_end"), "camera")
+    return "the mean by shifts of the last place %s" % np.round(g[1][:3], 4)
+
+
 def test_places():
     """place and film_points: where a thing is, in the scene and in its picture"""
     s = im.load_dict(im.cornell_box(res=32))
