@@ -44,6 +44,8 @@ static enum imp_status refuse(const struct imp_scene *scene, int shape, const ch
         scene->shapes[shape]->name, why);
 }
 
+#define HALF_TURN 1e-6 /* so near to half a turn, rounding chooses the way */
+
 /* Why a body in an instance that moves in time has no edges there; NULL: it has. */
 static const char *body_why(const struct imp_scene *scene, const struct imp__body *body,
                             int clock)
@@ -51,6 +53,8 @@ static const char *body_why(const struct imp_scene *scene, const struct imp__bod
     const struct imp_shape *s = scene->shapes[body->shape];
     if (!imp__motion_is_rigid(scene->world->instance[clock].motion))
         return "is stretched by its motion";
+    if (scene->world->instance[clock].motion->angle > IMP_PI - HALF_TURN)
+        return "makes half a turn, which has two ways";
     if (s->geometry != IMP_TRIANGLES) return "is not made of triangles";
     if (s->smooth) return "has vertex normals (face_normals makes it flat)";
     return NULL;

@@ -347,6 +347,11 @@ static void refused_test(void)
              BOX(CUBE) "<transform name='to_world_end'><scale value='1.1'/>"
                        "<translate x='.5' y='-.5' z='1.2'/></transform></shape>",
          "mover.pose", "stretches"},
+        {"one that makes half a turn",
+         CAMERA(SHUTTER)
+             BOX(CUBE) "<transform name='to_world_end'><rotate z='1' angle='200'/>"
+                       "<translate x='.5' y='-.5' z='1.2'/></transform></shape>",
+         "mover.pose", "half a turn"},
         {"one that dips into the floor on its way",
          CAMERA(SHUTTER) BOX(CUBE) "<transform name='to_world_end'><translate x='.5' "
                                    "z='-.6'/></transform></shape>",

@@ -217,7 +217,7 @@ static void looked_up(const struct imp__moved_by *m, const struct imp_vertex *v,
         if (imp__is_zero(then->straight)) at.uv[1] = old.uv[1];
         else /* the height of a cylinder is not of the point, but of the hit */
             at.uv[1] += imp__dot(old.dp_dv, x - then->p) / imp__dot(old.dp_dv, old.dp_dv);
-    } else if (imp__decided_surface(scene, &v->d, 0, &old)) {
+    } else if (imp__decided_surface(scene, &v->d, then->time, &old)) {
         imp__surface_grad(&old, grad);
         for (int k = 0; k < 2; k++) at.uv[k] += imp__dot(grad[k], x - then->p);
     }

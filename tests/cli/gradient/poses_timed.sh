@@ -23,6 +23,9 @@ importon info --set cart.pose_end=0,0.5,0,0,0,0.4 scene.xml | grep 'pose_end'
 importon gradient -q --spp 4 -p cart.pose -p cart.pose_end -p floor.pose -p camera.pose scene.xml | grep -c 'pose'
 importon gradient -q --spp 4 -p cart.pose_end --target x.pfm scene.xml | grep -c 'cart.pose_end\['
 importon check -q --paths 100 -p cart.pose -p cart.pose_end -p camera.pose --only frozen scene.xml | grep -c ' ok'
+wood="<bsdf type=\"diffuse\"><texture type=\"bitmap\" name=\"reflectance\"><string name=\"filename\" value=\"$ROOT/scenes/textured/waves.png\"/></texture></bsdf>"
+sed "s|<scale value=\"0.4\"/></transform>|&$wood|" scene.xml >painted.xml
+importon check -q --paths 100 -p cart.pose -p cart.pose_end -p camera.pose --only frozen painted.xml | grep -c ' ok'
 importon fit -q --spp 4 -p cart.pose_end --target x.pfm -n 1 -o fitted scene.xml | grep -c 'cart.pose_end\['
 importon gradient -q --spp 4 -p cart.scale scene.xml
 importon gradient -q --spp 4 -p cart.to_world scene.xml
