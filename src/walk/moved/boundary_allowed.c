@@ -249,6 +249,7 @@ enum imp_status imp__boundary_allowed(const struct imp__boundary *b)
     if (st == IMP_OK) st = ball_allowed(b);
     if (st == IMP_OK) st = imp__rays_allowed(b);
     if (st == IMP_OK) st = facets_allowed(b);
+    if (st == IMP_OK) st = imp__cuts_allowed(b);
     if (st == IMP_OK) st = camera_allowed(b);
     return st;
 }

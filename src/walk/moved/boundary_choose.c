@@ -30,6 +30,7 @@ static bool timed_set(struct imp__edge_draw *d, int clock)
 
 static bool point_set(struct imp__edge_draw *d, const struct imp__edge_point *p)
 {
+    d->edges = d->b->edges;
     d->edge = p->edge;
     d->p = p->p;
     d->along = imp__normalize(p->edge->b - p->edge->a);

@@ -345,11 +345,14 @@ void imp__meter_reach(struct imp__edge_draw *d, const struct imp__meter_point *x
 /* IMP_E_UNSUPPORTED, with names: edges that tear, shapes that pass through each other, facets that
  * become lit at once, a camera inside of a shape. */
 enum imp_status imp__boundary_allowed(const struct imp__boundary *b);
-/* ... of edges and seams; of borders of media. */
+/* ... of edges and seams; of borders of media; of what moves in time; of near planes and meters that cut
+ * what moves. */
 enum imp_status imp__edges_allowed(const struct imp__boundary *b);
 enum imp_status imp__borders_allowed(const struct imp__boundary *b);
-/* ... of what moves in time. */
 enum imp_status imp__timed_allowed(const struct imp__boundary *b);
+enum imp_status imp__cuts_allowed(const struct imp__boundary *b);
+/* Where the rays through the film's corners begin to see, in order around it. */
+bool imp__near_plane(const struct imp_sensor *s, imp_v3 p[4]);
 
 /* ---- One draw of each kind ---- */
 void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);

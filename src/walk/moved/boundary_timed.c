@@ -2,6 +2,7 @@
  *
  * What scenes must not hold in which instances move in time (boundary.h): refused by name. */
 #include "boundary_parts.h"
+#include "kind/sensor/receiver.h"
 
 static const char *scene_why(const struct imp__boundary *b)
 {
@@ -35,6 +36,13 @@ static enum imp_status points_allowed(const struct imp__boundary *b, const doubl
         struct imp_emitter *e = k < 0 ? NULL : scene->emitters[k];
         imp_v3 box[2] = {imp__v3(INFINITY, INFINITY, INFINITY),
                          imp__v3(-INFINITY, -INFINITY, -INFINITY)};
+        if (!e && s->shape && imp__shape_is_absent(s->shape)) {
+            box[0] = s->shape->lo;
+            box[1] = s->shape->hi;
+        }
+        imp_v3 near[4]; /* the near plane cuts what passes it */
+        for (int i = 0; !e && !s->shape && i < 4 && imp__near_plane(s, near); i++)
+            box_add(box, near[i]);
         if (!e && !s->shape && !b->parallel)
             for (uint32_t i = 0; i < LENS; i++) {
                 const struct imp_key key = imp__key(5, 4, i);
