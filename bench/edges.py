@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Loss and gradient by the pose of a bumpy ball, by its number of triangles: processor seconds.
+"""Loss and gradient by the pose of a bumpy ball, by its number of triangles: processor seconds and peak memory.
 
     python3 bench/edges.py [-b IMPORTON] [--triangles N ...] [--spp N] [--rounds N]
 
@@ -14,6 +14,7 @@ import random
 import resource
 import subprocess
 import tempfile
+import time
 
 here = os.path.dirname(os.path.abspath(__file__))
 SCENE = """<scene version="3.0.0"><integrator type="path"><integer name="max_depth" value="4"/></integrator>
@@ -64,6 +65,17 @@ def seconds(command, rounds):
     return best
 
 
+def peak(command):
+    """Megabytes of the program alone (VmHWM of Linux): what a parent's children used holds the parent's, too."""
+    most = 0
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as program:
+        while program.poll() is None:
+            with open("/proc/%d/status" % program.pid, encoding="utf-8") as status:
+                most = max([most] + [int(line.split()[1]) for line in status if line.startswith("VmHWM")])
+            time.sleep(.002)
+    return most / 1024
+
+
 def main():
     ap = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     ap.add_argument("-b", "--importon", default=os.path.join(os.path.dirname(here), "build/cli/importon"))
@@ -80,9 +92,10 @@ def main():
         common = ["-q", "-m", "mono", "-t", "1", "--spp", str(a.spp)]
         for n in a.triangles:
             n = ball(os.path.join(folder, "ball.obj"), n)
-            picture = seconds([a.importon, "render", scene, *common, "-o", os.path.join(folder, "picture.exr")], a.rounds)
-            gradient = seconds([a.importon, "gradient", scene, *common, "--target", seen, "-p", "ball.pose"], a.rounds)
-            print("%d triangles: gradient %.3f s, picture %.3f s" % (n, gradient, picture), flush=True)
+            picture = [a.importon, "render", scene, *common, "-o", os.path.join(folder, "picture.exr")]
+            gradient = [a.importon, "gradient", scene, *common, "--target", seen, "-p", "ball.pose"]
+            print("%d triangles: gradient %.3f s, %.0f MB, picture %.3f s, %.0f MB"
+                  % (n, seconds(gradient, a.rounds), peak(gradient), seconds(picture, a.rounds), peak(picture)), flush=True)
 
 
 if __name__ == "__main__":
