@@ -2,7 +2,7 @@
  *
  * Draws of the boundary, and what they bring as derivatives (boundary.h). */
 #include "base/arguments.h"
-#include "boundary_parts.h"
+#include "boundary_allowed.h"
 #include "kind/emitter/ies.h"
 #include "kind/sensor/receiver.h"
 #include "moved_mirror.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Places and motions that the boundary cannot differentiate (boundary.h), refused by name. */
+#include "boundary_allowed.h"
 #include "base/arguments.h"
 #include "boundary_one_sided.h"
 #include "move/strand.h"

@@ -4,7 +4,7 @@
  * meter that is absent. What moves through one is cut by it, along a line that is no edge of anything:
  * refused by name. */
 #include "base/arguments.h"
-#include "boundary_parts.h"
+#include "boundary_allowed.h"
 #include "kind/sensor/receiver.h"
 
 enum { CORNERS = 4 };

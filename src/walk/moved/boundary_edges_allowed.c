@@ -2,7 +2,7 @@
  *
  * Edges and seams that the boundary cannot differentiate (boundary.h), refused by name. */
 #include "base/arguments.h"
-#include "boundary_parts.h"
+#include "boundary_allowed.h"
 
 static const char *face_name(const struct imp__boundary *b, size_t face)
 {

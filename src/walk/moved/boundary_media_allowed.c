@@ -3,7 +3,7 @@
  * Borders of media that have no derivative (boundary.h): those which a lamp meets, and meshes that open
  * where a vertex moves. */
 #include "base/arguments.h"
-#include "boundary_parts.h"
+#include "boundary_allowed.h"
 #include "scene/pose.h"
 #include "scene/sealed.h"
 

@@ -311,8 +311,6 @@ struct imp__flux *imp__ray_jump_add(struct imp__edge_draw *d, imp_spec L);
 /* The point slides along the ray: two ends of f, where a shift of the point counts `shift`. */
 void imp__ray_point_ends(const struct imp__edge_draw *d, imp_v3 shift,
                          struct imp__flux *f);
-/* IMP_E_UNSUPPORTED, with the name of what a ray must not meet. */
-enum imp_status imp__rays_allowed(const struct imp__boundary *b);
 
 /* ---- Seams of lights: boundary_seam.c ---- */
 /* Which surface of a seam, 0 or 1, is a light that a walk meets first, at the seam. -1: none. */
@@ -341,18 +339,6 @@ bool imp__meter_meet(const struct imp__edge_draw *d, imp_v3 o, imp_v3 to,
                      const struct imp_hit *hit, struct imp__meter_point *x);
 void imp__meter_reach(struct imp__edge_draw *d, const struct imp__meter_point *x,
                       const struct imp__edge_light *light);
-
-/* IMP_E_UNSUPPORTED, with names: edges that tear, shapes that pass through each other, facets that
- * become lit at once, a camera inside of a shape. */
-enum imp_status imp__boundary_allowed(const struct imp__boundary *b);
-/* ... of edges and seams; of borders of media; of what moves in time; of near planes and meters that cut
- * what moves. */
-enum imp_status imp__edges_allowed(const struct imp__boundary *b);
-enum imp_status imp__borders_allowed(const struct imp__boundary *b);
-enum imp_status imp__timed_allowed(const struct imp__boundary *b);
-enum imp_status imp__cuts_allowed(const struct imp__boundary *b);
-/* Where the rays through the film's corners begin to see, in order around it. */
-bool imp__near_plane(const struct imp_sensor *s, imp_v3 p[4]);
 
 /* ---- One draw of each kind ---- */
 void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);

@@ -9,7 +9,7 @@
  *
  * and x slides along the ray. So does a curve where the shading normal of a mesh turns away from x
  * (boundary_shading.c). Other vertices are connected to x (boundary_reach.c). */
-#include "boundary_parts.h"
+#include "boundary_allowed.h"
 #include "kind/cleared.h"
 #include "scene/located.h"
 #include "walk/core/step.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What scenes must not hold in which instances move in time (boundary.h): refused by name. */
-#include "boundary_parts.h"
+#include "boundary_allowed.h"
 #include "kind/sensor/receiver.h"
 
 static const char *scene_why(const struct imp__boundary *b)
