@@ -156,7 +156,7 @@ static void print_luminaires(struct json *j)
         }
         printf("luminaire: %s, %.5g lm", l.name, l.flux);
         if (l.watts > 0) printf(", %.4g W", l.power);
-        if (l.efficacy > 0) printf(", %.4g lm/W", l.efficacy);
+        if (l.efficacy > 0) printf(", %.4g lm/W as measured", l.efficacy);
         if (l.level != 1) printf(", dimmed to %.3g", l.level);
         if (l.maintenance != 1) printf(", maintenance factor %.3g", l.maintenance);
         printf(", %s at (%g, %g, %g)\n", l.is_point ? "a point" : "a shape",

@@ -206,6 +206,8 @@ void checkpoint_hint(const char *path)
 {
     const char *ended;
     if (!progress_interrupted() && !ranks_ended(&ended)) return;
-    if (path) cli_say("importon: interrupted; go on from %s with --resume", path);
+    if (path)
+        cli_say("importon: interrupted; --checkpoint %s --resume goes on from there",
+                path);
     else cli_say("importon: interrupted; with --checkpoint FILE a fit can be resumed");
 }

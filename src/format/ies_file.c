@@ -231,6 +231,7 @@ bool imp__ies_is_valid(const struct imp_ies_data *d)
            span_is_known(d->type, d->n_horizontal, d->horizontal);
 }
 
+#define OPENING_MAX 20 /* m: what is sold is shorter */
 static enum imp_status parse(struct reader *r, struct imp_arena *keep,
                              struct imp_ies_data *d)
 {
@@ -320,6 +321,12 @@ static enum imp_status parse(struct reader *r, struct imp_arena *keep,
             "%s: its intensities are %.4g lm, and its lamps give %.4g lm alone; the "
             "intensities count",
             r->name, table, d->lamp_flux);
+    const double longest = fmax(fmax(d->size[0], d->size[1]), d->size[2]);
+    if (longest > OPENING_MAX)
+        imp__warn(r->ctx,
+                  "%s: its luminous opening is %.4g m long: LM-63 has %s here, not "
+                  "millimetres",
+                  r->name, longest, units == 1 ? "feet" : "metres");
 out:
     return st;
 }

@@ -205,7 +205,7 @@ kill -INT "$(<pid0)"
 wait $!
 rc=$?
 ok $((rc != 130)) "Ctrl-C of one rank ends all: exit code $rc"
-n=$(grep -c '^importon: interrupted; go on from state with --resume$' stderr)
+n=$(grep -c '^importon: interrupted; --checkpoint state --resume goes on from there$' stderr)
 ok $((n != 1)) "and says how to go on"
 goes_on interrupted
 begin rank0/state
