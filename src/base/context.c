@@ -196,7 +196,9 @@ void imp__context_own(imp_context *ctx)
 int imp_context_threads(const imp_context *ctx) { return ctx ? ctx->threads : 0; }
 
 /* Last error of this thread's calls that had no context. */
-static _Thread_local char without_context[256];
+/* Aligned: mold 1.10 places bytes of threads at an address of any kind in front of what is made
+ * read-only, and a program whose page begins there does not start. */
+static _Thread_local _Alignas(16) char without_context[256];
 
 const char *imp_last_error(const imp_context *ctx)
 {
