@@ -215,7 +215,7 @@ rc=$?
 ok $((rc == 0)) "a rank that dies ends the run: exit code $rc"
 # MPICH ends the others without asking; its mpirun says so.
 if [[ $mpi == openmpi ]]; then
-    n=$(grep -c '^importon: other ranks do not answer\|^importon: interrupted; go on from state' stderr)
+    n=$(grep -c '^importon: other ranks do not answer\|^importon: interrupted; --checkpoint state --resume' stderr)
     ok $((n != 2)) "with a sentence"
 else
     ! grep -q 'BAD TERMINATION' out stderr
