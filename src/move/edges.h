@@ -61,8 +61,8 @@ struct imp__edges {
     size_t n, n_faces;
     struct imp__edge *edge; /* [n], along a curve through space: neighbours are near */
     struct imp__edge_face *face; /* [n_faces] */
-    /* What moves in time is where it is at time 0. The first run rests; behind the last one is where the
-     * list ends. */
+    /* Runs of the list, one for each instance that moves in time, at its place of time 0; the first
+     * holds the edges at rest. run[n_runs] is the end of the list. */
     int n_runs;
     struct imp__edge_run *run; /* [n_runs + 1] */
     /* Edges of a body that lie in the surface of another and have faces on both sides of it: the

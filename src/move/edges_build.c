@@ -242,7 +242,8 @@ static uint64_t code_of(const struct building *x, const struct imp__edge *e)
     return code;
 }
 
-/* One that has edges of what rests too is refused (imp__clocks_allowed). */
+/* The instance that moves an edge in time, -1: none. imp__clocks_allowed refuses edges whose faces have
+ * two. */
 static int clock_of(const struct building *x, const struct imp__edge *e)
 {
     return imp__place_clock(x->scene, x->out->face[e->first].place);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Edges of instances that move in time (edges.h). A motion that stretches nothing carries the edges of a body
- * along as they are, with their sides and the angles between their faces; they are listed where they are at
- * time 0. Bodies whose places change against each other must not meet while the shutter is open, since where
- * they do is an edge that comes and goes: it is asked of the boxes that they sweep in short times. */
+ * Edges of instances that move in time (edges.h). A rigid motion keeps lengths, and angles between faces, so
+ * that edges are listed at time 0 and mapped to the time of a draw. Two bodies in relative motion must not
+ * intersect while the shutter is open, since their line of intersection is an edge at some times alone:
+ * swept bounding boxes of short intervals are tested. */
 #include "base/context.h"
 #include "edges.h"
 
